@@ -51,14 +51,16 @@ class ZeroSide:
     """Way below zero [mm]; 0 if it is too short for an answer."""
     under: np.ndarray
     """Range of each channel clearly below zero [its unit], shape (channels,)."""
+    over: np.ndarray
+    """Range of each channel clearly above zero, over that side's share of the way [its unit], shape (channels,)."""
     whole: np.ndarray
     """Range of each channel along the path [its unit], shape (channels,)."""
 
-    def answered(self, ranges: np.ndarray) -> float:
-        """Return `low` if readings answer there as they do in the range ``ranges``, else 0."""
+    def answered(self, ranges: np.ndarray) -> tuple[bool, bool]:
+        """Return whether readings answer below and above zero as they do in the range ``ranges``."""
         # One channel alone may be one that nothing presses.
-        enough = np.linalg.norm(self.under) >= ANSWERED * max(np.linalg.norm(ranges), 1e-300)
-        return self.low if enough else 0.0
+        least = ANSWERED * max(float(np.linalg.norm(ranges)), 1e-300)
+        return bool(np.linalg.norm(self.under) >= least), bool(np.linalg.norm(self.over) >= least)
 
 
 def zero_side(depth: np.ndarray, readings: np.ndarray) -> ZeroSide:
@@ -72,10 +74,11 @@ def zero_side(depth: np.ndarray, readings: np.ndarray) -> ZeroSide:
     depth, readings = depth[finite], readings[finite]
     ranges = _range(readings)
     low = -float(depth.min(initial=0.0))
-    below = depth < -CLEARLY * low
-    if depth.max(initial=0.0) <= 0 or low < BELOW * float(depth.max()) or below.sum() < FEWEST:
-        return ZeroSide(0.0, np.zeros_like(ranges), ranges)
-    return ZeroSide(low, _range(readings[below]), ranges)
+    high = float(depth.max(initial=0.0))
+    below, over = depth < -CLEARLY * low, _range(readings[depth > CLEARLY * high]) * (1 + low / max(high, 1e-300))
+    if high <= 0 or low < BELOW * high or below.sum() < FEWEST:
+        return ZeroSide(0.0, np.zeros_like(ranges), over, ranges)
+    return ZeroSide(low, _range(readings[below]), over, ranges)
 
 
 def below_zero(sides: Sequence[ZeroSide]) -> float:
@@ -86,8 +89,14 @@ def below_zero(sides: Sequence[ZeroSide]) -> float:
     if not sides:
         return 0.0
     ranges = np.max([side.whole for side in sides], axis=0)
-    each = [side.answered(ranges) for side in sides]
+    each = [side.low * all(side.answered(ranges)) for side in sides]
     return max(each) if np.count_nonzero(each) >= 0.5 * len(each) else 0.0
+
+
+def turned(sides: Sequence[ZeroSide]) -> list[int]:
+    """Return the numbers of the paths along which readings answer below zero alone: their sign is another."""
+    ranges = np.max([side.whole for side in sides], axis=0) if sides else np.zeros(0)
+    return [number for number, side in enumerate(sides) if side.answered(ranges) == (True, False)]
 
 
 def always_touched(course: Course) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tacdata import documents, provenance, schemas
-from tacdata.chain.at_rest import ZeroSide, below_zero, zero_side
+from tacdata.chain.at_rest import ZeroSide, below_zero, turned, zero_side
 from tacdata.display import Displayed
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
@@ -226,6 +226,11 @@ class _Import:
             self.notes.append(
                 f"readings answer as much below zero, down to {below:.4g} mm, as above: does it touch there, too? "
                 f"Then count depth from the lowest (offset: {lowest:g} under depth, or contact); else it is no contact"
+            )
+        if numbers := turned(self.sides):
+            self.notes.append(
+                f"readings answer below zero alone in {len(numbers)} of {len(self.sides)} recordings, the first is "
+                f"{numbers[0]}: is the depth's sign another there? Then give scale: -1 for their files"
             )
         if doubt := rest_doubt(self.rests):
             self.notes.append(doubt)

@@ -322,8 +322,8 @@ def _measured(name: str, entry: ColumnsEntry, table: SourceTable) -> list[Stream
     values, doubts = _readings(table, names, entry, f"measured: {name}")
     values = values * entry.scale
     ours = {quantity_of(each) or "" for each in units if each}
-    if len(ours) == 1 and ours <= {"N", "mm"}:
-        (unit,) = ours
+    if len(ours) == 1 and (ours <= {"N", "mm"} or (name == "force" and ours != {""})):
+        unit = "N" if name == "force" else ours.pop()  # a force in mm is refused
         factors = [factor(each, unit, f"measured: {name}") if each else 1.0 for each in units]
         values = values * np.repeat(factors, [max(table.inner(column), 1) for column in names])
     elif several := _several(units):

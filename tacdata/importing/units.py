@@ -69,6 +69,8 @@ WIDE_BRACKETS = str.maketrans("\uff08\uff09\uff3b\uff3d\u3010\u3011\uff5b\uff5d"
 """Brackets of Chinese and Japanese programs, and ours."""
 WORDS = ("IN", "MIN")
 """Endings of names that are no unit, as of "V_IN" and "T_MIN"."""
+NAMES = ("d", "ft")
+"""Endings that are no unit without brackets: a depth or distance, a force-torque sensor."""
 CLOCKS = r"(time|t|zeit|elapsed|timestamp|clock)"
 """Names behind which a capital S is seconds, and no siemens."""
 BRACKETED = r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*"
@@ -149,15 +151,14 @@ def split_unit(name: str) -> tuple[str, str]:
         is_known = _is_unit(match[2])
         if match[2] == "S" and re.fullmatch(CLOCKS, match[1].strip().lower()):
             return match[1].strip(), "s"
-        # Without brackets a lone "d" is a name (depth, distance), no unit of days.
-        return (match[1].strip(), match[2]) if is_known and match[2] != "d" else (name, "")
+        return (match[1].strip(), match[2]) if is_known and match[2].lower() not in NAMES else (name, "")
     if match := re.fullmatch(r"(.+?)\s*[-.:]\s*([A-Za-z\u00b5]{2,})", name) or re.fullmatch(
         r"(.*[a-z\d])((?:Ms|Us|Ns|Mm|Um|Sec|Msec|Usec|Millis|Micros|Nanos|Seconds))", name
     ):
         hump = name[match.start(2) - 1].isalnum()
         unit = plain(match[2].lower() if hump or match[2].lower() in SPELLED else match[2])
         # "min" and "in" behind a point are rather a minimum and an input.
-        return (match[1].strip(), unit) if quantity_of(unit) and unit not in ("min", "in") else (name, "")
+        return (match[1].strip(), unit) if quantity_of(unit) and unit not in ("min", "in", *NAMES) else (name, "")
     return name, ""
 
 

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.npz import WHOLE, rows_of
+from tacdata.importing.formats.npz import WHOLE, rows_of, stacked
 from tacdata.importing.formats.source_format import SourceFormat
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
+from tacdata.importing.text.stated_rate import stated_rate
 
 LINES = (".jsonl", ".ndjson")
 BROKEN = 0.01
@@ -33,7 +34,7 @@ class Json(SourceFormat):
         by_line = path.suffix.lower() in LINES
         doubts: list[str] = []
         content = _by_line(path, text, doubts) if by_line else _by_name(json.loads(text))
-        arrays = {name: _array(values) for name, values in _lists(content).items()}
+        arrays = {name: _array(values) for name, values in _lists(content, doubts).items()}
         table = rows_of(path, arrays, options)
         if table.rows < FEWEST:
             raise FormatError(
@@ -43,7 +44,9 @@ class Json(SourceFormat):
             )
         stated = _units(content)
         units = {name: unit for name in table.columns if (unit := stated.get(name.rpartition(".")[2]))}
-        return replace(table, units={**units, **table.units}, doubts=tuple(doubts))
+        settings = [f"{name}: {value}" for name, value in _flat({"": content}).items() if not isinstance(value, list)]
+        rate = stated_rate("\n".join([*settings, ""]), len(settings))
+        return replace(table, units={**units, **table.units}, doubts=tuple(doubts), rate=rate)
 
 
 def _by_name(content: Any) -> Any:
@@ -94,18 +97,35 @@ def _units(value: Any) -> dict[str, str]:
     return {}
 
 
-def _lists(value: Any, name: str = "") -> dict[str, list[Any]]:
-    """Return the lists in a value by name."""
+def _lists(value: Any, doubts: list[str], name: str = "") -> dict[str, Any]:
+    """Return the lists in a value by name, and what is left out in ``doubts``."""
     if isinstance(value, dict):
-        inside = [_lists(part, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
+        inside = [_lists(part, doubts, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
         return {key: values for part in inside for key, values in part.items()}
     if not isinstance(value, list) or not value:
         return {}
     if not any(isinstance(row, dict) for row in value):
         return {name or WHOLE: value}
     rows = [_flat(row) if isinstance(row, dict) else {} for row in value]
+    if trials := _trials(rows):
+        lost: list[str] = []
+        columns = stacked(name, trials, lost)
+        doubts += [f"left out: {', '.join(lost)}"] * bool(lost)
+        return columns
     names = dict.fromkeys(key for row in rows for key in row)
     return {f"{name}.{key}" if name else key: [row.get(key) for row in rows] for key in names}
+
+
+def _trials(rows: list[dict[str, Any]]) -> list[dict[str, np.ndarray]]:
+    """Return the columns of each trial if each row holds several long lists; [] if a row is a sample."""
+    lengths = [[len(value) for value in row.values() if isinstance(value, list)] for row in rows]
+    longest = max(len(rows), FEWEST - 1)
+    if not all(each and each.count(max(each)) > 1 and max(each) > longest for each in lengths):
+        return []
+    return [
+        {key: _array(value) if isinstance(value, list) else np.array(value) for key, value in row.items()}
+        for row in rows
+    ]
 
 
 def _flat(row: dict[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.hdf5 import Hdf5
-from tacdata.importing.formats.npz import rows_of
+from tacdata.importing.formats.npz import rows_of, stacked
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
@@ -96,7 +96,7 @@ def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
     # A cell array may hold structures, columns, or anything.
     if isinstance(value, (list, np.ndarray)) and np.ndim(value) and len(value):
         if all(isinstance(entry, dict) for entry in value):
-            return _stacked(name, list(value), lost)
+            return stacked(name, [_flatten("", element, lost) for element in value], lost)
         if _are_columns(value):
             return {name or "array": np.stack([np.asarray(entry, float) for entry in value], axis=1)}
     array = np.asarray(value)
@@ -130,27 +130,3 @@ def _are_columns(value: Any) -> bool:
     if not (isinstance(value, np.ndarray) and value.dtype.hasobject) or [len(shape) for shape in shapes] != [1]:
         return False
     return all(isinstance(number, (int, float, np.number)) for entry in value for number in entry)
-
-
-def _stacked(name: str, elements: list[dict[str, Any]], lost: list[str]) -> dict[str, np.ndarray]:
-    tables = [_flatten("", element, lost) for element in elements]
-    rows = [max((len(np.atleast_1d(a)) for a in table.values()), default=0) for table in tables]
-    shared = [key for key in tables[0] if all(key in table for table in tables)]
-    prefix = f"{name}." if name else ""
-    lost += [
-        f"{prefix}{key} (not in all {len(tables)} elements)"
-        for key in dict.fromkeys(k for table in tables for k in table)
-        if key not in shared
-    ]
-    stacked = {}
-    for key in shared:
-        parts = []
-        for table, count in zip(tables, rows, strict=True):
-            part = np.squeeze(table[key])
-            # A single value of an element (its speed, its label) holds for all of its rows.
-            parts.append(np.repeat(part[None], count, axis=0) if part.ndim == 0 else part)
-        if len({part.shape[1:] for part in parts}) == 1 and all(len(p) == n for p, n in zip(parts, rows, strict=True)):
-            stacked[prefix + key] = np.concatenate(parts)
-        else:
-            lost.append(f"{prefix}{key} (of other rows than its element)")
-    return {**stacked, f"{prefix}element": np.repeat(np.arange(len(elements)), rows)}

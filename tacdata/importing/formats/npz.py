@@ -179,3 +179,33 @@ def _column(array: np.ndarray) -> np.ndarray:
         # Only integers beyond 2^53 stay so, as Unix nanoseconds: a float64 would round them.
         return values.astype(np.int64) if np.abs(values).max() > 2**53 else values.astype(float)
     return values.astype(float) if values.dtype.kind == "f" else values.astype(str).astype(object)
+
+
+def stacked(name: str, tables: list[dict[str, np.ndarray]], lost: list[str]) -> dict[str, np.ndarray]:
+    """Return tables of several trials below one another, with a column ``element`` that numbers them.
+
+    Args:
+        name: Put before the names of the columns; may be empty.
+        tables: Columns of each trial; a single value holds for all of its rows.
+        lost: Receives the names of columns that are left out, with the reason.
+    """
+    rows = [max((len(np.atleast_1d(a)) for a in table.values()), default=0) for table in tables]
+    shared = [key for key in tables[0] if all(key in table for table in tables)]
+    prefix = f"{name}." if name else ""
+    lost += [
+        f"{prefix}{key} (not in all {len(tables)} elements)"
+        for key in dict.fromkeys(k for table in tables for k in table)
+        if key not in shared
+    ]
+    columns = {}
+    for key in shared:
+        parts = []
+        for table, count in zip(tables, rows, strict=True):
+            part = np.squeeze(table[key])
+            # A single value of an element (its speed, its label) holds for all of its rows.
+            parts.append(np.repeat(part[None], count, axis=0) if part.ndim == 0 else part)
+        if len({part.shape[1:] for part in parts}) == 1 and all(len(p) == n for p, n in zip(parts, rows, strict=True)):
+            columns[prefix + key] = np.concatenate(parts)
+        else:
+            lost.append(f"{prefix}{key} (of other rows than its element)")
+    return {**columns, f"{prefix}element": np.repeat(np.arange(len(tables)), rows)}

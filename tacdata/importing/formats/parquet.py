@@ -1,5 +1,7 @@
 """Parquet and Feather tables."""
 
+import re
+from ast import literal_eval
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +11,12 @@ from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
+from tacdata.importing.text.layout import are_units
 
 IN_FILE, FIRST = b"ARROW1", b"FEA1"
 """First bytes of Arrow's file format and of the first Feather; its stream format has none."""
+LEVELS = re.compile(r"\(('[^'\\]*'|\d+)(, ('[^'\\]*'|\d+))+\)")
+"""Name of a column with several levels."""
 
 
 class Parquet(SourceFormat):
@@ -36,7 +41,8 @@ class Parquet(SourceFormat):
         # `flatten` opens one level of nesting.
         while any(pa.types.is_struct(field.type) for field in table.schema):
             table = table.flatten()
-        names = [str(name) for name in table.column_names]
+        levels = [_levels(str(name)) for name in table.column_names]
+        names = [name for name, _ in levels]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             places = ", ".join(
                 f"{name} in columns {' and '.join(str(k) for k, n in enumerate(names) if n == name)}" for name in twice
@@ -46,7 +52,7 @@ class Parquet(SourceFormat):
             )
         notes: list[str] = []
         columns = {name: _column(table.column(k), f"{path.name}: {name}", notes) for k, name in enumerate(names)}
-        units = {
+        units = {name: unit for name, unit in levels if unit} | {
             field.name: field.metadata[key].decode()
             for field in table.schema
             for key in (b"unit", b"units")
@@ -55,6 +61,13 @@ class Parquet(SourceFormat):
         typed = {field.name: str(field.type.unit) for field in table.schema if pa.types.is_duration(field.type)}
         typed |= {field.name: "ns" for field in table.schema if pa.types.is_timestamp(field.type)}
         return SourceTable(path, columns, units | typed, frozenset(typed), tuple(notes))
+
+
+def _levels(name: str) -> tuple[str, str]:
+    """Return the name and the unit in a name of several levels, as pandas writes ('force', 'mN')."""
+    parts = [str(part) for part in literal_eval(name) if part] if LEVELS.fullmatch(name) else [name]
+    unit = parts.pop() if len(parts) > 1 and are_units(parts[-1:]) else ""
+    return " ".join(parts), unit
 
 
 def _column(column: Any, where: str, notes: list[str]) -> np.ndarray:

@@ -12,9 +12,9 @@ from tacdata.importing.units import plain
 
 MEANT = ("strain", "angle", "force")
 """Roles that may replace a depth, best first."""
-ONE_WAY, WIDE, APART = 0.8, 0.5, 0.2
+ONE_WAY, WIDE, APART, STILL = 0.8, 0.5, 0.2, 0.1
 """Half a stroke ends this share of its range from its beginning, and spans this share of the whole. The next one
-begins at its end, to within this share."""
+begins at its end, to within this share. A part that spans less than the last share is a hold."""
 ALIKE = 0.9
 """Share of the steps in which two lengths move equally, from which one is a copy of the other."""
 RATES = tuple(step * 10.0**power for power in (-1, 0, 1, 2) for step in (1, 2, 5))[:10]
@@ -75,7 +75,7 @@ def _levels(table: SourceTable, name: str) -> int:
 
 
 def are_halves(labels: np.ndarray, axis: np.ndarray) -> bool:
-    """Return whether labels part strokes into halves, as "1-Stretch" and "1-Recover" do.
+    """Return whether labels part strokes into halves, as "1-Stretch" and "1-Recover" do, with holds or without.
 
     Args:
         labels: The column's value in each row, shape (rows,).
@@ -83,8 +83,8 @@ def are_halves(labels: np.ndarray, axis: np.ndarray) -> bool:
     """
     edges = [0, *(np.flatnonzero(labels[1:] != labels[:-1]) + 1).tolist(), len(labels)]
     runs = [axis[a:b][np.isfinite(axis[a:b])] for a, b in pairwise(edges)]
-    runs = [run for run in runs if len(run) > 2]
     extent = float(np.nanmax(axis) - np.nanmin(axis))
+    runs = [run for run in runs if len(run) > 2 and np.ptp(run) > STILL * extent]
     if len(runs) < 4 or extent <= 0:
         return False
     net = np.array([run[-1] - run[0] for run in runs])

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tacdata.chain.at_rest import below_zero, zero_side
+from tacdata.chain.at_rest import below_zero, turned, zero_side
 from tacdata.errors import FormatError
 from tacdata.importing.mapping import Axis, PositionEntry, Quantity, SourceClock, TrialRule, Value
 from tacdata.importing.proposing.drives import length_of
@@ -74,6 +74,10 @@ def proposed_position(
         questions.append(Question(f"{listed(counted)}: {words}", "unit", tuple(counted)))
     elif unsaid:
         questions.append(Question(f"{listed(unsaid)}: no unit is given; {unit} is a guess", "unit", tuple(unsaid)))
+    for name, unit in {name: table.units.get(name, "") for name in names.values()}.items():
+        if unit and quantity_of(unit) != "mm" and "stand_in" not in roles:
+            words = f"how many mm are 1 {unit}? Give unit: mm, and their number as scale"
+            questions.append(Question(f"{name}: it is in {unit}: {words}", "unit", (name,)))
     entry = PositionEntry(file=kind.alias, clock=clock, axes=dict[str, Quantity](axes))
     try:
         time_ns, _ = times(table, clock, "")
@@ -108,7 +112,14 @@ def _turned(
         way = "falls" if motion.sign < 0 else "grows"
         text = f"{name}: it {way} into the skin, so its sign is turned (scale: -1)"
         questions.append(Question(text, "sign", (name,)))
-    if is_depth and (offset := _lowest(axis, kind.table, name, channels)):
+    offset, change = _lowest(axis, kind.table, name, channels) if is_depth else (0.0, 0)
+    if change:
+        text = (
+            f"{name}: from row {change} on readings answer to the other sign: was its direction changed? Then make two "
+            "files of it, and give scale: -1 for one"
+        )
+        questions.append(Question(text, "sign", (name,)))
+    if offset:
         axis = replace(axis, offset=offset)
         text = (
             f"{name}: readings answer on both sides of its zero, so depth is counted from the lowest "
@@ -140,15 +151,22 @@ def _turned(
     return replace(proposed, entry=replace(entry, axes=others | {pressing: axis}), questions=tuple(questions))
 
 
-def _lowest(axis: Axis, table: SourceTable, name: str, channels: list[str]) -> float:
-    """Return what is added to a depth [mm] so that it counts from its lowest, where readings answer below zero."""
+def _lowest(axis: Axis, table: SourceTable, name: str, channels: list[str]) -> tuple[float, int]:
+    """Return what is added to a depth [mm] so that it counts from its lowest, where readings answer below zero.
+
+    Returns:
+        The sum, and the row where readings begin to answer to the other sign alone; 0 without one.
+    """
     parts = [table.column(channel) for channel in channels if channel in table.columns]
     if not parts:
-        return 0.0
+        return 0.0, 0
     depth = axis.scale * table.column(name).astype(float) * _in_mm(table, name, axis)
     readings = np.column_stack(parts).astype(float)
-    low = below_zero([zero_side(depth[rows], readings[rows]) for rows in _each_press(depth)])
-    return float(np.ceil(1000 * low) / 1000) if low else 0.0
+    spans = _each_press(depth)
+    sides = [zero_side(depth[rows], readings[rows]) for rows in spans]
+    of_each = [number in turned(sides) for number in range(len(spans))]
+    change = next((spans[k].start for k in range(1, len(spans)) if of_each[k] != of_each[k - 1]), 0)
+    return float(np.ceil(1000 * below_zero(sides)) / 1000), change
 
 
 def _each_press(depth: np.ndarray) -> list[slice]:

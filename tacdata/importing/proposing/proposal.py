@@ -109,12 +109,7 @@ def proposed_mapping(source: Path, found: dict[str, FoundKind]) -> Proposal:
         *questions_of([f"{listed([*path])} of the press: taken from the files' names, in mm"] if path else []),
         *(question for _, further in specimens for question in further),
         *questions_of(
-            [
-                *(_unsaid(measured["force"]) if "force" in measured else ()),
-                *_unnamed(wide),
-                *shared,
-                *_unused(kinds, used, wide),
-            ]
+            [*_force_unit(kinds, measured.get("force")), *_unnamed(wide), *shared, *_unused(kinds, used, wide)]
         ),
     )
     return Proposal(Mapping.from_document(document_of(mapping), source.parent), questions, kinds, files)
@@ -164,11 +159,19 @@ def _measured(kinds: list[SourceKind], clocks: dict[str, SourceClock]) -> dict[s
     return measured
 
 
-def _unsaid(force: ColumnsEntry) -> list[str]:
+def _force_unit(kinds: tuple[SourceKind, ...], force: ColumnsEntry | None) -> list[str]:
     """Return a question about a force without a unit."""
-    names = [str(name) for name in force.columns] if isinstance(force.columns, list) else [str(force.columns)]
-    is_said = force.unit or any(split_unit(name)[1] for name in names)
-    return [] if is_said else [f"{listed(names)}: no unit is given: give unit: N under force"]
+    names = [str(name) for name in force.columns] if force and isinstance(force.columns, list) else []
+    units = [split_unit(name)[1] for name in names]
+    if force is None or force.unit or any(unit and not unit.isdigit() for unit in units):
+        return []
+    table = next(kind.table for kind in kinds if kind.alias == force.file)
+    values = np.column_stack([table.column(name).astype(float) for name in names])
+    if not np.nansum(values % 1):
+        return [
+            f"{listed(names)}: whole numbers without a unit: how many are a newton? Give unit: 1/NUMBER N under force"
+        ]
+    return [f"{listed(names)}: no unit is given: give unit: N, mN, g or another one under force"]
 
 
 def _unnamed(kind: SourceKind) -> list[str]:
@@ -206,6 +209,14 @@ def _unused(kinds: tuple[SourceKind, ...], used: set[Any], wide: SourceKind) -> 
         for kind in kinds
         if kind.alias not in used
     ]
+    known = {name for names in wide.roles.values() for name in names}
+    for name, values in wide.table.columns.items():
+        texts = {str(value) for value in values.tolist()} if values.dtype == object and name not in known else set()
+        if 2 * len(texts) > wide.table.rows:
+            questions.append(
+                f"{name} holds text, as {min(texts)[:40]!r}, and is not used: if these are readings, save them as "
+                "numbers, a column each"
+            )
     if idle := [name for role in IDLE for name in wide.roles.get(role, [])]:
         more = f" and {len(idle) - 12} more" if len(idle) > 12 else ""
         questions.append(f"no channels but settings, states, counters or constants: {', '.join(idle[:12])}{more}")

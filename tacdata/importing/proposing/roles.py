@@ -27,9 +27,9 @@ GUESSES = {
         r"(pos(ition)?|depth|disp(lacement)?|z)|(pos(ition)?|depth|p?_?z)_?(set|target|cmd|ref)"
     ),
     "error": r"((pos(ition)?|tracking|following|control|depth|z)_?)?(error|err|deviation)",
-    "x": rf"({BODY}[_.]?)?x|p_?x|x_{BODY}|(actual_)?tcp_pose_?0",
-    "y": rf"({BODY}[_.]?)?y|p_?y|y_{BODY}|(actual_)?tcp_pose_?1",
-    "z": rf"({BODY}[_.]?)?z|p_?z(_?(meas(ured)?|act(ual)?|ist))?|z_{BODY}|height|(actual_)?tcp_pose_?2",
+    "x": rf"({BODY}[_.]?)?x|p_?x|x_?{BODY}|(actual_)?tcp_pose_?0",
+    "y": rf"({BODY}[_.]?)?y|p_?y|y_?{BODY}|(actual_)?tcp_pose_?1",
+    "z": rf"({BODY}[_.]?)?z|p_?z(_?(meas(ured)?|act(ual)?|ist))?|z_?{BODY}|height|(actual_)?tcp_pose_?2",
     "force": (
         r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)"
         r"|(actual_)?tcp_force_?[0-2]"
@@ -42,7 +42,7 @@ GUESSES = {
         r"|sample_?(id|no|nr|number|name)"
     ),
     "counter": (
-        r"(counter|frame|seq(uence)?|sample|index|n|row|line|iter(ation)?|loop|packet)(_?(id|no|nr|number|count))?"
+        r"(counter|frame|seq(uence)?|sample|index|n|row|line|iter(ation)?|loop|packet)(_?(id|no|nr|number|count))?|no|nr"
     ),
     "number": r"(channel|ch|taxel|sensor)(_?(id|no|nr|number|index))?",
     "value": r"(value|val|reading|wert)",
@@ -97,8 +97,8 @@ NO_PLACE = (
 """What has axes and is no place, in the path of a name."""
 ROBOT = re.compile(r"\W*(?:axis|joint)\w*\.[aej]?(\d)|\W*pose?(?:_\w+)?\.[abc]")
 """Joints and angles of robots, as $AXIS_ACT.A1 and $POS_ACT.A."""
-AGAIN, NUMBERED = re.compile(r"(.+?)\.\d+"), re.compile(r"(.+?)[ _-]?[(#]?\d+\)?")
-"""A name that comes again, as pandas numbers it, and as people do."""
+AGAIN = tuple(map(re.compile, (r"(.+?)\.\d+", r"(.+?)[ _-]?[(#]?\d+\)?", r".+ (\S+)")))
+"""A name that comes again, as pandas numbers it, as people do, and below the name of its trial."""
 NAMED = re.compile(r"_?(id|no|nr|number|index)$")
 """Ends of names of columns that number things, and so read nothing."""
 
@@ -136,7 +136,7 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
         # Without a column that numbers channels a value is a channel, and the other way round.
         unnumbered = [name for name in roles.pop("number", []) if not NAMED.search(name.lower())]
         roles["channels"] += roles.pop("value", []) + unnumbered
-    if idle := without_signal(table, roles["channels"]):
+    if idle := without_signal(table, roles["channels"], forced="force" in roles):
         roles["idle"] = list(idle)
         roles["channels"] = [name for name in roles["channels"] if name not in idle]
     if not {"depth", "z"} & set(roles):
@@ -153,12 +153,12 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
 def later_blocks(table: SourceTable) -> frozenset[str]:
     """Return the columns of all blocks but the first, where each name, the clock's too, comes again with a number.
 
-    So it is with trials side by side: t, depth, t.1, depth.1 or t_1, depth_1, t_2, depth_2.
+    So it is with trials side by side: t, depth, t.1, depth.1, or t_1, depth_1, t_2, depth_2, or A t, A depth, B t.
     """
-    for pattern in (AGAIN, NUMBERED):
+    for pattern in AGAIN:
         blocks: dict[str, list[str]] = {}
         for name in table.columns:
-            match = pattern.fullmatch(name if pattern is AGAIN else split_unit(name)[0])
+            match = pattern.fullmatch(name if pattern is AGAIN[0] else split_unit(name)[0])
             blocks.setdefault(match[1] if match else name, []).append(name)
         times_given = {len(names) for names in blocks.values()}
         clocks = [base for base in blocks if re.fullmatch(GUESSES["time"], bare_name(base))]
@@ -186,7 +186,7 @@ def bare_name(name: str) -> str:
 
     An axis of what is no place has its name in front: force.z is force_z.
     """
-    path = re.split(r"[./]" if name.startswith("/") else r"\.", name)
+    path = re.split(r"[./]" if name.startswith("/") else r"\.", name.rstrip("."))
     bare, _ = split_unit(path[-1])
     if len(path) > 1 and bare in "xyzw" and re.fullmatch(NO_PLACE, path[-2].lower()):
         bare = f"{path[-2]}_{bare}"
@@ -211,9 +211,11 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
     # "t" with the unit of another quantity, as V, is no time.
     if role == "time" and values.dtype != object and unit != "s" and unit_text.lower() in OTHERS:
         role = None
-    # R2 is a resistance next to R1, and X a count of rows where it rises by 1.
+    # R2 is a resistance next to R1, Tx a torque next to Fx, and X a count of rows where it rises by 1.
     if bare in ("r2", "r_2") and {"r1", "r_1", "r3", "r_3"} & set(map(bare_name, table.columns)):
         role = None
+    if re.fullmatch("[tm][xyz]", bare) and f"f{bare[1]}" in map(bare_name, table.columns):
+        role = "torque"
     if role == "x" and values.dtype != object and values.ndim == 1 and (np.diff(values) == 1).all():
         role = "counter"
     role = {"N": "force", "s": "time"}.get(unit or "", role)

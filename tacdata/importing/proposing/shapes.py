@@ -21,7 +21,7 @@ class ShapePolicy:
     exact: float = 1e-6
     """Roughness of numbers without noise [range]; smaller ones are rounding."""
     counts: float = 0.9
-    """Smallest share of steps of 1 in a counter of rows [1]."""
+    """Smallest share of equal steps in a counter of rows [1]."""
     parts: float = 0.02
     """Largest share of steps of 1 in a counter of cycles or parts [1]."""
     returns: float = 0.3
@@ -44,10 +44,13 @@ def varying(table: SourceTable, names: list[str]) -> int:
     return sum(int((np.nanmax(each, axis=1) > np.nanmin(each, axis=1)).sum()) for each in numbers if each.size)
 
 
-def without_signal(table: SourceTable, names: list[str], policy: ShapePolicy = POLICY) -> dict[str, str]:
+def without_signal(
+    table: SourceTable, names: list[str], policy: ShapePolicy = POLICY, *, forced: bool = False
+) -> dict[str, str]:
     """Return columns that measure nothing, each with the reason: constants, flags and counters of rows.
 
-    A constant among columns of one name and different numbers is a dead channel, and stays.
+    A constant among columns of one name and different numbers is a dead channel, and stays. If all are idle, they stay,
+    unless a force is read in addition (``forced``).
     """
     reasons = {name: _reason(table, name, policy) for name in names} if table.rows >= policy.rows else {}
     families: dict[str, list[str]] = {}
@@ -55,7 +58,9 @@ def without_signal(table: SourceTable, names: list[str], policy: ShapePolicy = P
         families.setdefault(NUMBER.sub("#", name), []).append(name)
     alive = {name for family in families.values() if not all(reasons[member] for member in family) for name in family}
     idle = {name: reason for name, reason in reasons.items() if reason and name not in alive}
-    return idle if len(idle) < len(names) else {}
+    # Numbered ones alone are a dead sensor; a counter next to a load cell is none.
+    is_sensor = len(idle) == len(names) and (not forced or max(map(len, families.values()), default=2) > 1)
+    return {} if is_sensor else idle
 
 
 def _reason(table: SourceTable, name: str, policy: ShapePolicy) -> str:
@@ -68,10 +73,11 @@ def _reason(table: SourceTable, name: str, policy: ShapePolicy) -> str:
         return "constant"
     if len(levels) == 2 and np.isin(levels, (0, 1)).all():
         return "a flag"
-    steps = np.diff(finite)
-    if len(finite) == len(values) and (steps == 1).all():
+    steps, is_whole = np.diff(finite), (finite == np.rint(finite)).all()
+    usual = np.median(steps)
+    if is_whole and usual > 0 and (steps == usual).mean() >= policy.counts:
         return "a counter of rows"
-    is_count = (finite == np.rint(finite)).all() and np.isin(steps, (0, 1)).all()
+    is_count = is_whole and np.isin(steps, (0, 1)).all()
     return "a counter of parts" if is_count and steps.mean() <= policy.parts else ""
 
 

@@ -23,7 +23,7 @@ def specimen_of(kind: SourceKind) -> tuple[KnownValue | None, tuple[Question, ..
     for name in kind.roles.get("specimen", []):
         if len({str(value) for value in kind.table.columns[name].tolist() if value is not None}) > 1:
             return KnownValue(file=kind.alias, column=name), ()
-    if part := next((f"part{k}" for k, text in enumerate(_texts(kind.kind)) if SPECIMEN.search(text)), None):
+    if part := next((f"part{k}" for k, text in enumerate(_texts(kind)) if SPECIMEN.search(text)), None):
         return KnownValue(part), ()
     questions: tuple[Question, ...] = ()
     for number, words in kind.found.words.items():
@@ -38,10 +38,11 @@ def specimen_of(kind: SourceKind) -> tuple[KnownValue | None, tuple[Question, ..
 
 def place_in_path(kind: SourceKind) -> dict[str, KnownValue]:
     """Return the parts of a path that are x and y, as in "x2.0_y-1.5"."""
-    matches = {k: PLACE.search(text) for k, text in enumerate(_texts(kind.kind))}
+    matches = {k: PLACE.search(text) for k, text in enumerate(_texts(kind))}
     return {match[1].lower(): KnownValue(f"part{k}") for k, match in matches.items() if match}
 
 
-def _texts(kind: str) -> list[str]:
-    """Return the texts of a path before each of its parts that differ."""
-    return kind.partition(INSIDE)[0].split("#")[:-1]
+def _texts(kind: SourceKind) -> list[str]:
+    """Return the texts of a path before each of its parts that differ; a single file has none."""
+    outer, _, inside = kind.kind.partition(INSIDE)
+    return outer.split("#")[:-1] if kind.found.count > 1 or "#" in inside else []

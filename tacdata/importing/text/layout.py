@@ -26,7 +26,7 @@ MISSING = (
     "Bad Input",
     *(
         "nan NaN NAN na NA n/a N/A n.a. null NULL (null) None <NA> NaT - -- --- ? -nan -nan(ind) nan(ind) "
-        "1.#QNAN -1.#QNAN 1.#IND -1.#IND 1.#INF -1.#INF N.A. n.d. k.A. s.o. \\N \u2013 \u2014 "
+        "1.#QNAN -1.#QNAN 1.#IND -1.#IND 1.#INF -1.#INF N.A. n.d. k.A. s.o. \\N \u2013 \u2014 \u221e -\u221e +\u221e "
     ).split(),
     *(f"{sign}1,#{word}" for sign in ("", "-") for word in ("QNAN", "IND", "INF")),
     *(f"{sign}1.#{word}" for sign in ("", "-") for word in ("IND0", "IND00", "INF0", "INF00", "QNAN0", "QNB", "J")),
@@ -112,6 +112,7 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
     sample = [row for row in rows[first:] if len(row) == width]
     if header and len(header[-1]) == width - 1 and _are_row_names(sample):
         header = [[ROW_NAME, *row] if len(row) == width - 1 else row for row in header]
+    _refuse_fewer_names(header, sample, origin)
     names, units = _names(header, width)
     start = lines.index(lines_of_data[first], skip)
     _refuse_unclear_signs(sample, names, origin)
@@ -158,6 +159,21 @@ def _refuse_commas_for_both(
             "are decimal points too",
             "one sign for each",
             "save it again with semicolons or tabs between the fields, or with decimal points",
+        )
+
+
+def _refuse_fewer_names(header: list[list[str]], rows: list[list[str]], origin: str) -> None:
+    """Refuse rows with a value more than the header has names: which of the columns has none is not known.
+
+    Raises:
+        FormatError: If they are so.
+    """
+    names, width = max(map(len, header), default=0), len(rows[0])
+    if 0 < names < width and any(row[-1] for row in rows):
+        raise FormatError(
+            f"{origin}: {names} names in the header, and {width} values in a row",
+            "a name for each column",
+            "add the name that is missing to a copy; or give header: false, and name the columns by numbers from 0",
         )
 
 
@@ -331,7 +347,8 @@ def are_units(fields: list[str]) -> bool:
     is_unit = [
         bool(re.fullmatch(BRACKETED, field)) or quantity_of(field) or plain(field).lower() in OTHERS for field in texts
     ]
-    return all(len(field.strip("[]() ")) <= 8 for field in texts) and 2 * sum(map(bool, is_unit)) >= max(len(texts), 1)
+    is_short = all(len(field.strip("[]() ")) <= 8 or quantity_of(field) for field in texts)
+    return is_short and 2 * sum(map(bool, is_unit)) >= max(len(texts), 1)
 
 
 def _kind(fields: list[str], decimal: str) -> str:

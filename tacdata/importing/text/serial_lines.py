@@ -14,8 +14,8 @@ RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
 """How a serial monitor marks when a line came."""
 LABELLED = re.compile(r"([A-Za-z_][\w%/\[\]]*)[ \t]*[:=][ \t]*([-+]?\.?\d[^\s,;|]*|nan|NaN)")
 """A name with its value, as a serial plotter reads them."""
-OF_FRAME = re.compile(LABELLED.pattern + r"(?:[ \t]+([A-Za-z\u00b5%]+)(?![\w%]|[ \t]*[:=]))?")
-"""The same with a unit, as above a frame."""
+WITH_UNIT = re.compile(LABELLED.pattern + r"(?:[ \t]+([A-Za-z\u00b5%]+)(?![\w%]|[ \t]*[:=]))?")
+"""The same with a unit behind it."""
 FRAME = re.compile(r"^([A-Za-z].*\d.*)\n((?:[ \t]*[-+.\d][-+.\d \t,;eE]*\n){2,64})(?![ \t]*[-+.\d])", re.MULTILINE)
 """A frame of a matrix: rows of numbers below a line with words and values. More rows are a trial."""
 
@@ -23,17 +23,22 @@ FRAME = re.compile(r"^([A-Za-z].*\d.*)\n((?:[ \t]*[-+.\d][-+.\d \t,;eE]*\n){2,64
 def without_labels(data: bytes) -> bytes:
     """Return lines of t:0.05,depth:0.1 or t=0.05 depth=0.1 as columns below a header; other text as it is."""
     tail = [line for line in data[-TAIL:].decode("utf-8", "replace").split("\n")[1:] if line.strip()]
-    found = Counter(tuple(name for name, _ in LABELLED.findall(line)) for line in tail)
+    found = Counter(_names(line) for line in tail)
     names, count = found.most_common(1)[0] if found else ((), 0)
     if len(set(names)) < max(len(names), 2) or count < ALIKE * len(tail):
         return data
-    if any(LABELLED.sub("", line).strip(" \t,;|\r") for line in tail[: len(tail) // 2]):
+    if any(WITH_UNIT.sub("", line).strip(" \t,;|\r") for line in tail[: len(tail) // 2]):
         return data
     rows = ["\t".join(names)]
     for line in data.decode("utf-8", "replace").split("\n"):
-        pairs = LABELLED.findall(line)
-        rows.append("\t".join(value for _, value in pairs) if tuple(name for name, _ in pairs) == names else line)
+        values = [value for _, value, _ in WITH_UNIT.findall(line)]
+        rows.append("\t".join(values) if _names(line) == names else line)
     return "\n".join(rows).encode()
+
+
+def _names(line: str) -> tuple[str, ...]:
+    """Return the names of a line's values, with their units in brackets."""
+    return tuple(f"{name} [{unit}]" if unit else name for name, _, unit in WITH_UNIT.findall(line))
 
 
 def with_frames(data: bytes) -> bytes:
@@ -51,7 +56,7 @@ def with_frames(data: bytes) -> bytes:
 
 def _frame(match: re.Match[str]) -> tuple[str, str]:
     """Return the names and the values of a frame as lines with tabs."""
-    pairs = OF_FRAME.findall(re.sub(r"^([A-Za-z]+)[ #]+(?=\d)", r"\1=", match[1]))
+    pairs = WITH_UNIT.findall(re.sub(r"^([A-Za-z]+)[ #]+(?=\d)", r"\1=", match[1]))
     rows = [re.split(r"[\s,;]+", row.strip(" \t,;")) for row in match[2].splitlines()]
     cells = {f"r{r}c{c}": cell for r, row in enumerate(rows) for c, cell in enumerate(row)}
     names = [f"{name} [{unit}]" if unit else name for name, _, unit in pairs]
@@ -66,6 +71,8 @@ def with_receipt(data: bytes) -> bytes:
     if 2 * sum(bool(RECEIPT.match(line)) for line in tail) <= len(tail):
         return data
     cut = [line.partition(b"->")[2].strip() if RECEIPT.match(line) else b"" for line in lines]
+    named = without_labels(b"\n".join(cut)).split(b"\n")
+    lines, cut = [*[b""] * (len(named) - len(cut)), *lines], named  # the names are a line more
     layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), ReadOptions(), "")
     between = b"\t" if layout.delimiter == " " else layout.delimiter.encode()
     bodies = [between.join(text.split()) if layout.delimiter == " " else text for text in cut]

@@ -13,33 +13,40 @@ STATED_RATE = re.compile(
 )
 """How a file states its rate above its rows."""
 STATED_STEP = re.compile(
-    r'^\W*(?:Delta_X|sampl\w*[ _](?:interval|period))"?[\t,;:=]\s*"?(\d*[.,]?\d+(?:e[-+]?\d+)?)'
+    r'^\W*(?:Delta_X|(?:sampl|record)\w*[ _](?:interval|period|cycle))"?[\t,;:=]\s*"?(\d*[.,]?\d+(?:e[-+]?\d+)?)'
     r"(?:[\t ,;\"]*([m\u00b5un]?s(?:ec)?)\b)?",
     re.MULTILINE | re.IGNORECASE,
 )
 """How LabVIEW and oscilloscopes state the time between two rows [s]."""
 RATE_ALONE = re.compile(
-    r"(?:sampl\w*|abtast\w*|acquisition|scan)[ _-]*(?:rate|freq\w*)\W{0,4}(?:(k?)(?:hz|s/s|sps|1/s)\W{1,4})?"
+    r"(?:(?:sampl\w*|abtast\w*|acquisition|scan)[ _-]*(?:rate|freq[a-z]*)|\bfs\b)[\W_]{0,4}"
+    r"(?:(k?)(?:hz|s/s|sps|1/s)\W{1,4})?"
     r"(\d+(?:\.\d+)?)(?=\s*(?:$|[,;}\]\t\"]))",
     re.IGNORECASE | re.MULTILINE,
 )
 """A rate with its unit before the number, or without one."""
 COUNTS = r"(?:counts?|steps?|ticks?|pulses|inc(?:rement)?s?)"
-STATED_COUNTS = re.compile(
-    rf"(\d+(?:\.\d+)?)\s*{COUNTS}\s*(?:/|per )\s*mm\b|{COUNTS}\s*(?:/|per )\s*mm\b\W{{1,4}}(\d+(?:\.\d+)?)", re.I
-)
-"""How a file states how many counts of its encoder are a millimetre."""
-COUNTED = re.compile(
-    r"(enc(oder)?|steps?|pulses|(stage|motor|present|z)?_?pos(ition)?|z)(_?(count|step|tick)s?)?", re.I
-)
-"""Names of positions that a motor or an encoder may count."""
+PER = rf"{COUNTS}\s*(?:/|per )\s*(mm|N|newton|force)\b"
+STATED_COUNTS = re.compile(rf"(\d+(?:\.\d+)?)\s*{PER}|{PER}\W{{1,4}}(\d+(?:\.\d+)?)(?:\s*\(?(N|lbf|kgf))?", re.I)
+"""How a file states how many counts are a millimetre or a newton."""
+COUNTED = {
+    "mm": re.compile(
+        r"(enc(oder)?|steps?|pulses|(stage|motor|present|z)?_?pos(ition)?|z)(_?(count|step|tick)s?)?", re.I
+    ),
+    "N": re.compile(r"f_?[xyzn]?|(force|load)(_?[xyzn])?", re.I),
+}
+"""Names of positions and forces that a motor, an encoder or a converter may count."""
 
 
 def stated_counts(text: str, skip: int, columns: dict[str, np.ndarray]) -> dict[str, str]:
-    """Return the unit, as 1/800 mm, of positions in whole numbers, if the first lines of a text state their size."""
-    match = STATED_COUNTS.search("\n".join(text.split("\n", skip)[:skip]))
-    names = [name for name in columns if match and COUNTED.fullmatch(name) and columns[name].dtype != object]
-    return {n: f"1/{match[1] or match[2]} mm" for n in names if match and not np.nansum(columns[n] % 1)}
+    """Return the unit, as 1/800 mm, of whole numbers, if the first lines of a text state the size of a count."""
+    units = {}
+    for match in STATED_COUNTS.finditer("\n".join(text.split("\n", skip)[:skip])):
+        ours = "mm" if (match[2] or match[3]).lower() == "mm" else "N"
+        names = [name for name in columns if COUNTED[ours].fullmatch(name) and columns[name].dtype != object]
+        whole = [name for name in names if not np.nansum(columns[name] % 1)]
+        units |= dict.fromkeys(whole, f"1/{match[1] or match[4]} {(match[5] if ours == 'N' else '') or ours}")
+    return units
 
 
 def stated_rate(text: str, skip: int) -> float:
