@@ -54,6 +54,13 @@ MARKS = {b"\xff\xfe\0\0": "utf-32", b"\0\0\xfe\xff": "utf-32", b"\xff\xfe": "utf
 """Byte order marks and their encodings; the longer ones first."""
 
 
+class UnknownWord(FormatError):
+    """Cells of a column of numbers that hold a word."""
+
+    word = ""
+    """The word, if it is one alone."""
+
+
 class Csv(SourceFormat):
     """Columns of text."""
 
@@ -102,7 +109,7 @@ def table_of(path: Path, data: bytes, options: ReadOptions, notes: list[str]) ->
     step = columns.get("Increment", np.empty(0))  # an oscilloscope gives it in the first row alone
     if step.dtype != object and np.isfinite(step).sum() == 1 and np.nansum(step) > 0:
         rate = float(1 / np.nansum(step))
-    units = {**stated_counts(head, layout.skip, columns), **layout.units}
+    units = {**layout.units, **stated_counts(head, layout.skip, columns)}
     return SourceTable(path, columns, units, notes=tuple(notes), doubts=tuple(doubts), rate=rate)
 
 
@@ -354,13 +361,15 @@ def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path,
     share = OF_WORDS if len(words) <= WORDS else UNREADABLE
     # A number with a sign between thousands can be read in two ways, so one is enough to refuse.
     if grouped is not None or len(wrong) > share * len(texts):
-        raise FormatError(
+        error = UnknownWord(
             f"{path}: column {name}, row {row + 1} of the data: {cell}",
             f"a number with a decimal {'comma' if layout.decimal == ',' else 'point'}",
             f"add {cell} to missing in the mapping if it means no value, else correct the file"
             if grouped is None
             else "save it again without a sign between thousands",
         )
+        error.word = words.pop() if len(words) == 1 and grouped is None else ""
+        raise error
     doubts.append(
         f"{path.name}: {len(wrong)} cells of {name} hold no number and are missing, the first in row {row + 1} of the "
         f"data: {cell}"

@@ -100,6 +100,9 @@ def _units(value: Any) -> dict[str, str]:
 def _lists(value: Any, doubts: list[str], name: str = "") -> dict[str, Any]:
     """Return the lists in a value by name, and what is left out in ``doubts``."""
     if isinstance(value, dict):
+        parts = [_flat(part) for part in value.values() if isinstance(part, dict)]
+        if len(parts) == len(value) > 1 and _trials(parts):  # {"trial_1": {...}, "trial_2": {...}}
+            return _lists(parts, doubts, name)
         inside = [_lists(part, doubts, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
         return {key: values for part in inside for key, values in part.items()}
     if not isinstance(value, list) or not value:

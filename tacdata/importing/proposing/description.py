@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.importing.formats.csv import UnknownWord
 from tacdata.importing.formats.source_format import is_known, read_table, tables_in
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.proposing.file_kinds import INSIDE, kinds_of, merged, numberless
@@ -104,7 +105,12 @@ def _described(source: Path, form: str) -> tuple[dict[str, FoundKind], str]:
 
 def _read(path: Path, options: ReadOptions) -> tuple[SourceTable, ReadOptions]:
     """Return a file's table and the options that read it: with trials along the axis that loses fewest arrays."""
-    table = read_table(path, options)
+    try:
+        table = read_table(path, options)
+    except UnknownWord as error:
+        if not error.word or any(map(str.isdigit, error.word)):
+            raise
+        return _read(path, replace(options, missing=(*options.missing, error.word)))
     best, best_options = len(_lost(table)), options
     for axis in (2, 0, 1) if path.suffix in (".mat", ".npz") and best else ():
         try:

@@ -46,6 +46,8 @@ def proposed_file(kind: SourceKind) -> ProposedFile:
         paths, table = (paths, list(sheets)) if same else (tuple(pattern(part)[0] for part in outers), table)
     elif "#" in inside:
         table = pattern(inside, parts)[0]
+    if words := found.options.missing:
+        questions += (Question(f"{listed(list(words))} in {found.path}: taken for no value (missing)"),)
     clock, doubts = _clock(kind, Path(outer).name)
     options = replace(found.options, table=None)
     return ProposedFile(FileEntry(paths, options, table, found.join, clock=clock), questions + doubts)
@@ -76,6 +78,9 @@ def _clock(kind: SourceKind, file: str) -> tuple[SourceClock, tuple[Question, ..
         doubt = Question(f"{error.given}: {error.remedy}", "clock", (names[0],), kind.alias)
         if layout:
             doubt = Question(text, "date", file=kind.alias, word=layout)
+        elif table.rate and table.column(names[0]).dtype != object:
+            text = f"{names[0]}: its unit is not known; the file's {table.rate:g} rows a second are taken instead"
+            clock, doubt = SourceClock(rate=table.rate), Question(text, "rate", file=kind.alias, value=table.rate)
         return replace(clock, format=layout), (*questions, doubt)
     return clock, questions
 

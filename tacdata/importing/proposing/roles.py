@@ -31,7 +31,7 @@ GUESSES = {
     "y": rf"({BODY}[_.]?)?y|p_?y|y_?{BODY}|(actual_)?tcp_pose_?1",
     "z": rf"({BODY}[_.]?)?z|p_?z(_?(meas(ured)?|act(ual)?|ist))?|z_?{BODY}|height|(actual_)?tcp_pose_?2",
     "force": (
-        r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)"
+        r"(f|fz|fn|force(_?z)?|load(_?cell)?|weight|kraft|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)"
         r"|(actual_)?tcp_force_?[0-2]"
     ),
     "torque": r"(torque|moment)(_?[xyz])?|tau_?[xyz]|drehmoment|(actual_)?tcp_force_?[3-5]",
@@ -75,7 +75,7 @@ GUESSES = {
 """Meaning of a column by its name without the unit."""
 PLACE = r"(pos(ition)?s?|pose|xyz|(tip|tcp|probe|indenter|stage|eef?|end_?effector|robot)(_?pos(e|ition)?)?)"
 """Name of an array whose first three columns are a place."""
-WRENCH = r"wrench|f(orce)?_?(/|_|and)?_?t(orque)?|force_?torque|(ft|wrench)_?(sensor|data)?"
+WRENCH = r"wrench|f(orce)?_?(/|_|and)?_?t(orque)?|force_?torque|(\w+_)?(ft|wrench)_?(sensor|data)?"
 """Name of an array whose first three columns are a force, and the others a torque."""
 TORQUE = re.compile(
     r"[kmucn]?N[ .*\u00b7\u22c5-]?[mc]?m|(in|ft)[ .*\u00b7-]?(lbf?|ozf?)|(lbf?|ozf?)[ .*\u00b7-]?(in|ft)"
@@ -208,8 +208,14 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
         return "temperature"
     if TORQUE.fullmatch(unit_text):
         return "torque"
-    # "t" with the unit of another quantity, as V, is no time.
-    if role == "time" and values.dtype != object and unit != "s" and unit_text.lower() in OTHERS:
+    # "t" or "d" with the unit of another quantity, as V, is no time and no depth.
+    if (
+        (role == "time" or len(bare) == 1)
+        and role not in (None, "force")
+        and values.dtype != object
+        and not unit
+        and unit_text.lower() in OTHERS
+    ):
         role = None
     # R2 is a resistance next to R1, Tx a torque next to Fx, and X a count of rows where it rises by 1.
     if bare in ("r2", "r_2") and {"r1", "r_1", "r3", "r_3"} & set(map(bare_name, table.columns)):

@@ -46,6 +46,8 @@ SAMPLE, TAIL = 2000, 100
 """Lines that are examined, and the last of them, which tell the layout."""
 
 
+REMARK = re.compile(r"comment|remark|note|bemerkung|event|marker", re.IGNORECASE)
+"""Last name of a header whose column is written in some rows alone."""
 LABEL = re.compile(r"(\w+[_ ])?(units?|einheit(en)?)([_ ]\w+)?:?", re.IGNORECASE)
 """First cell of a line of units, which is no unit."""
 ROW_NAME = "row"
@@ -112,7 +114,7 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
     sample = [row for row in rows[first:] if len(row) == width]
     if header and len(header[-1]) == width - 1 and _are_row_names(sample):
         header = [[ROW_NAME, *row] if len(row) == width - 1 else row for row in header]
-    _refuse_fewer_names(header, sample, origin)
+    _refuse_other_number(header, sample, origin)
     names, units = _names(header, width)
     start = lines.index(lines_of_data[first], skip)
     _refuse_unclear_signs(sample, names, origin)
@@ -162,18 +164,19 @@ def _refuse_commas_for_both(
         )
 
 
-def _refuse_fewer_names(header: list[list[str]], rows: list[list[str]], origin: str) -> None:
-    """Refuse rows with a value more than the header has names: which of the columns has none is not known.
+def _refuse_other_number(header: list[list[str]], rows: list[list[str]], origin: str) -> None:
+    """Refuse rows with a value more or less than the header has names: which of the columns lacks one is not known.
 
     Raises:
         FormatError: If they are so.
     """
-    names, width = max(map(len, header), default=0), len(rows[0])
-    if 0 < names < width and any(row[-1] for row in rows):
+    names, width = header[-1] if header else [], len(rows[0])
+    unnamed = 0 < max(map(len, header), default=0) < width and any(row[-1] for row in rows)
+    if unnamed or any(name and not REMARK.search(name) for name in names[width:]):
         raise FormatError(
-            f"{origin}: {names} names in the header, and {width} values in a row",
+            f"{origin}: {len(names)} names in the header, and {width} values in a row",
             "a name for each column",
-            "add the name that is missing to a copy; or give header: false, and name the columns by numbers from 0",
+            "correct the header in a copy; or give header: false, and name the columns by numbers from 0",
         )
 
 

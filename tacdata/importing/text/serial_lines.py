@@ -16,13 +16,16 @@ LABELLED = re.compile(r"([A-Za-z_][\w%/\[\]]*)[ \t]*[:=][ \t]*([-+]?\.?\d[^\s,;|
 """A name with its value, as a serial plotter reads them."""
 WITH_UNIT = re.compile(LABELLED.pattern + r"(?:[ \t]+([A-Za-z\u00b5%]+)(?![\w%]|[ \t]*[:=]))?")
 """The same with a unit behind it."""
+BEFORE = re.compile(r"^\s*[\[(]?\s*(\d+(?:\.\d+)?)\s*([mu\u00b5]?s)?\s*[\])][ :]*(?=[A-Za-z])", re.MULTILINE)
+"""A time in brackets before the first name."""
 FRAME = re.compile(r"^([A-Za-z].*\d.*)\n((?:[ \t]*[-+.\d][-+.\d \t,;eE]*\n){2,64})(?![ \t]*[-+.\d])", re.MULTILINE)
 """A frame of a matrix: rows of numbers below a line with words and values. More rows are a trial."""
 
 
 def without_labels(data: bytes) -> bytes:
     """Return lines of t:0.05,depth:0.1 or t=0.05 depth=0.1 as columns below a header; other text as it is."""
-    tail = [line for line in data[-TAIL:].decode("utf-8", "replace").split("\n")[1:] if line.strip()]
+    text = BEFORE.sub(r"time=\1 \2\t", data.decode("utf-8", "replace"))
+    tail = [line for line in text[-TAIL:].split("\n")[1:] if line.strip()]
     found = Counter(_names(line) for line in tail)
     names, count = found.most_common(1)[0] if found else ((), 0)
     if len(set(names)) < max(len(names), 2) or count < ALIKE * len(tail):
@@ -30,7 +33,7 @@ def without_labels(data: bytes) -> bytes:
     if any(WITH_UNIT.sub("", line).strip(" \t,;|\r") for line in tail[: len(tail) // 2]):
         return data
     rows = ["\t".join(names)]
-    for line in data.decode("utf-8", "replace").split("\n"):
+    for line in text.split("\n"):
         values = [value for _, value, _ in WITH_UNIT.findall(line)]
         rows.append("\t".join(values) if _names(line) == names else line)
     return "\n".join(rows).encode()

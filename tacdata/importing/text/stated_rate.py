@@ -13,8 +13,8 @@ STATED_RATE = re.compile(
 )
 """How a file states its rate above its rows."""
 STATED_STEP = re.compile(
-    r'^\W*(?:Delta_X|(?:sampl|record)\w*[ _](?:interval|period|cycle))"?[\t,;:=]\s*"?(\d*[.,]?\d+(?:e[-+]?\d+)?)'
-    r"(?:[\t ,;\"]*([m\u00b5un]?s(?:ec)?)\b)?",
+    r'^\W*(?:Delta_X|(?:sampl|record)\w*[ _](?:interval|period|cycle))"?\s*(?:[\[(]([m\u00b5un]?s)[\])])?"?'
+    r'[\t,;:=]\s*"?(\d*[.,]?\d+(?:e[-+]?\d+)?)(?:[\t ,;"]*([m\u00b5un]?s(?:ec)?)\b)?',
     re.MULTILINE | re.IGNORECASE,
 )
 """How LabVIEW and oscilloscopes state the time between two rows [s]."""
@@ -58,5 +58,5 @@ def stated_rate(text: str, skip: int) -> float:
     if match := RATE_ALONE.search(head):
         return float(match[2]) * (1000.0 if match[1] else 1.0)
     match = STATED_STEP.search(head)
-    step = float(match[1].replace(",", ".")) * factor(match[2] or "s", "s", "") if match else 0.0
+    step = float(match[2].replace(",", ".")) * factor(match[1] or match[3] or "s", "s", "") if match else 0.0
     return 1 / step if step > 0 else 0.0
