@@ -20,6 +20,7 @@ from pathlib import Path
 import bags  # noqa: F401
 import cells  # noqa: F401
 import clocks  # noqa: F401
+import columns  # noqa: F401
 import numpy as np
 import positions  # noqa: F401
 import shapes  # noqa: F401

@@ -73,12 +73,12 @@ def zero_side(depth: np.ndarray, readings: np.ndarray) -> ZeroSide:
     finite = np.isfinite(depth) & np.isfinite(readings).any(axis=1)
     depth, readings = depth[finite], readings[finite]
     ranges = _range(readings)
-    low = -float(depth.min(initial=0.0))
-    high = float(depth.max(initial=0.0))
-    below, over = depth < -CLEARLY * low, _range(readings[depth > CLEARLY * high]) * (1 + low / max(high, 1e-300))
-    if high <= 0 or low < BELOW * high or below.sum() < FEWEST:
-        return ZeroSide(0.0, np.zeros_like(ranges), over, ranges)
-    return ZeroSide(low, _range(readings[below]), over, ranges)
+    low, high = -float(depth.min(initial=0.0)), float(depth.max(initial=0.0))
+    below = depth < -CLEARLY * low
+    is_way = low >= BELOW * high and below.sum() >= FEWEST
+    under = _range(readings[below]) if is_way else np.zeros_like(ranges)
+    over = _range(readings[depth > CLEARLY * high]) * (1 + low / high if high else 1.0)
+    return ZeroSide(low if is_way and high else 0.0, under, over, ranges)
 
 
 def below_zero(sides: Sequence[ZeroSide]) -> float:

@@ -66,7 +66,7 @@ class Parquet(SourceFormat):
 def _levels(name: str) -> tuple[str, str]:
     """Return the name and the unit in a name of several levels, as pandas writes ('force', 'mN')."""
     parts = [str(part) for part in literal_eval(name) if part] if LEVELS.fullmatch(name) else [name]
-    unit = parts.pop() if len(parts) > 1 and are_units(parts[-1:]) else ""
+    unit = parts.pop() if len(parts) > 1 and not parts[-1].isdigit() and are_units(parts[-1:]) else ""
     return " ".join(parts), unit
 
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tacdata.chain.at_rest import below_zero, turned, zero_side
+from tacdata.chain.at_rest import below_zero, zero_side
 from tacdata.errors import FormatError
 from tacdata.importing.mapping import Axis, PositionEntry, Quantity, SourceClock, TrialRule, Value
 from tacdata.importing.proposing.drives import length_of
@@ -22,6 +22,8 @@ ENDS, FAR = 3, 5.0
 """Most first rows that are no positions [rows], and their smallest distance from all others [their range]."""
 COUNTED = re.compile(r"(?<![a-z])(micro)?(steps?|ticks?|pulses|counts|increments)(?![a-z])", re.IGNORECASE)
 """Words of a position that a motor or an encoder counts."""
+PRESSED = 0.5
+"""Smallest share of the largest depth that is a press [1]; between two presses a path comes below half of it."""
 SHORTEST = 0.02
 """Strokes below are hardly in mm [mm]."""
 
@@ -115,8 +117,8 @@ def _turned(
     offset, change = _lowest(axis, kind.table, name, channels) if is_depth else (0.0, 0)
     if change:
         text = (
-            f"{name}: from row {change} on readings answer to the other sign: was its direction changed? Then make two "
-            "files of it, and give scale: -1 for one"
+            f"{name}: from row {change} on presses go to the other side of zero: was its direction changed? Then make "
+            "two files of it, and give scale: -1 for one"
         )
         questions.append(Question(text, "sign", (name,)))
     if offset:
@@ -162,11 +164,24 @@ def _lowest(axis: Axis, table: SourceTable, name: str, channels: list[str]) -> t
         return 0.0, 0
     depth = axis.scale * table.column(name).astype(float) * _in_mm(table, name, axis)
     readings = np.column_stack(parts).astype(float)
-    spans = _each_press(depth)
-    sides = [zero_side(depth[rows], readings[rows]) for rows in spans]
-    of_each = [number in turned(sides) for number in range(len(spans))]
-    change = next((spans[k].start for k in range(1, len(spans)) if of_each[k] != of_each[k - 1]), 0)
-    return float(np.ceil(1000 * below_zero(sides)) / 1000), change
+    whole = zero_side(depth, readings)
+    if whole.answered(whole.whole)[0] and (change := _change_of_side(depth)):
+        return 0.0, change
+    low = below_zero([zero_side(depth[rows], readings[rows]) for rows in _each_press(depth)])
+    return float(np.ceil(1000 * low) / 1000), 0
+
+
+def _change_of_side(depth: np.ndarray) -> int:
+    """Return the row from which all presses go to the other side of zero than those before; 0 without one.
+
+    A piston goes to both sides in turn, and a stage is in the air between two presses.
+    """
+    share = np.nan_to_num(depth) / np.nanmax(np.abs(depth))
+    known = np.flatnonzero((np.abs(share) > PRESSED) | (np.abs(share) < 0.5 * PRESSED))
+    side = np.sign(share[known]) * (np.abs(share[known]) > PRESSED)
+    begins = np.flatnonzero(np.diff(side, prepend=0.0) * side > 0)
+    changes = np.flatnonzero(np.diff(side[begins])) + 1
+    return int(known[begins[changes[0]]]) if len(changes) == 1 and len(begins) > 2 else 0
 
 
 def _each_press(depth: np.ndarray) -> list[slice]:

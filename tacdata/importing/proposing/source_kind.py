@@ -94,7 +94,7 @@ def widest(kinds: tuple[SourceKind, ...]) -> SourceKind:
 def _whole_strokes(table: SourceTable, columns: dict[str, list[str]]) -> tuple[dict[str, list[str]], str]:
     """Return the roles without a column of trials that marks halves of strokes, and a remark on it."""
     moving = columns.get("depth") or columns.get("z")
-    if not moving or "trial" not in columns or "[" in moving[0]:
+    if not moving or "trial" not in columns or moving[0] not in table.columns:
         return columns, ""
     name, labels = columns["trial"][0], table.column(columns["trial"][0]).astype(str)
     if not are_halves(labels, table.column(moving[0]).astype(float)):

@@ -304,7 +304,7 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
     if below is not None and not all(_filled(rows[:below])[1:]):
         below = None
     # LabVIEW writes units above the names, behind Y_Unit_Label; an oscilloscope shifts them by that.
-    above = next((row for row in whole[-2::-1] if LABEL.fullmatch(row[0]) and are_units(row[1:])), None)
+    above = next((row for row in whole[-2::-1] if LABEL.fullmatch(row[0]) and any(map(quantity_of, row[1:]))), None)
     above = above and above[any(above[width:]) :]
     units_row = rows[below] if below is not None else above
     titles = _filled(rows[:below])
