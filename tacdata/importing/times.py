@@ -74,8 +74,7 @@ def times(table: SourceTable, clock: SourceClock, where: str) -> tuple[np.ndarra
     scale = factor(unit, "s", f"{where}: {name}")
     if scale == DAY and (dated := _dated(values)):
         return _of_days(values, dated, clock), clock.zero or "unix"
-    _refuse_late(values, unit, scale, f"{where}: {name}")
-    _refuse_fast(values, unit, scale, f"{where}: {name}")
+    _refuse_other_unit(values, unit, scale, f"{where}: {name}")
     middle = float(np.nanmedian(values.astype(float))) * scale if len(values) else 0.0
     looks_unix = YEAR_2000 < middle < YEAR_2100
     if clock.zero == "unix" and not looks_unix:
@@ -173,44 +172,32 @@ def _refuse_unsaid(values: np.ndarray, unit: str, where: str) -> None:
     )
 
 
-def _refuse_late(values: np.ndarray, unit: str, scale: float, where: str) -> None:
-    """Refuse times that lie centuries away: in nanoseconds they have no place in 64 bits.
+def _refuse_other_unit(values: np.ndarray, unit: str, scale: float, where: str) -> None:
+    """Refuse times that lie centuries away, without a place in 64 bits of nanoseconds, or that come too fast.
+
+    Bursts are left alone: the mean rate counts.
 
     Raises:
         FormatError: Saying which unit would fit.
     """
     finite = values.astype(float)
     finite = finite[np.isfinite(finite)]
-    latest = float(np.abs(finite).max(initial=0.0)) * scale
-    if latest < LATEST:
-        return
-    fitting = _guessed(values)
-    raise FormatError(
-        f"{where}: in {unit} its times reach {latest:.3g} s, {latest / 3.156e7:.3g} years",
-        "times of this century, or of a clock that begins at zero",
-        f"correct unit under time in the mapping, to {fitting} for example"
-        if fitting != unit
-        else "correct the column or its unit under time in the mapping",
-    )
-
-
-def _refuse_fast(values: np.ndarray, unit: str, scale: float, where: str) -> None:
-    """Refuse times that come too fast in the unit that is given. Bursts are left alone: the mean counts.
-
-    Raises:
-        FormatError: Saying which unit would fit.
-    """
-    finite = values.astype(float)
-    finite = finite[np.isfinite(finite)]
-    span = float(finite.max() - finite.min()) * scale if len(finite) else 0.0
-    if span <= 0 or (len(finite) - 1) / span <= FASTEST:
-        return
-    dated = _dated(values)
-    raise FormatError(
-        f"{where}: in {unit} the rows come at {(len(finite) - 1) / span:.3g} Hz",
-        f"times at no more than {FASTEST:.0f} Hz",
-        f"correct unit under time in the mapping, to {dated or 'd'} for example",
-    )
+    latest, fitting = float(np.abs(finite).max(initial=0.0)) * scale, _guessed(values)
+    if latest >= LATEST:
+        raise FormatError(
+            f"{where}: in {unit} its times reach {latest:.3g} s, {latest / 3.156e7:.3g} years",
+            "times of this century, or of a clock that begins at zero",
+            f"correct unit under time in the mapping, to {fitting} for example"
+            if fitting != unit
+            else "correct the column or its unit under time in the mapping",
+        )
+    span = float(np.ptp(finite)) * scale if len(finite) else 0.0
+    if span > 0 and (len(finite) - 1) / span > FASTEST:
+        raise FormatError(
+            f"{where}: in {unit} the rows come at {(len(finite) - 1) / span:.3g} Hz",
+            f"times at no more than {FASTEST:.0f} Hz",
+            f"correct unit under time in the mapping, to {_dated(values) or 'd'} for example",
+        )
 
 
 DATES = (
