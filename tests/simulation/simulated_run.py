@@ -286,7 +286,7 @@ def _frames(run, faults, path):
     if episode.complete:
         yield from _true_path(run, episode)
     counter = episode.taxels.counter
-    touched = {"damaged_frame", "board_stalls", "board_unplugged"} & set(faults.names)
+    touched = {"damaged_frame", "board_stalls", "board_unplugged", "damaged_lift"} & set(faults.names)  # unplugs it too
     if not touched and len(counter) and np.any(np.diff(counter) != 1):
         yield f"{path.name} lacks frames: {np.flatnonzero(np.diff(counter) != 1)}"
     for view in recording.cameras.values():
