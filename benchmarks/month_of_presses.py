@@ -3,7 +3,7 @@
     python benchmarks/month_of_presses.py --hours 720 --presses 8 --out month.jsonl
 
 Each hour has a rig, a seed and a fault of its own; afterwards a person repairs the rig and resumes. A whole month has
-`--presses 694` an hour, half a million in all, and takes 20 to 70 hours of one core. With fewer presses an hour the
+`--presses 694` an hour, half a million in all, and takes some 60 hours of one core. With fewer presses an hour the
 faults stay, and the quiet time between them is left out. `--first` goes on with a later hour, `--cores` shares them.
 
 Printed: presses, hours of which an invariant of `tests/simulation/README.md` does not hold (a complete file that went
