@@ -12,14 +12,15 @@ import sys
 import tempfile
 import threading
 import uuid
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import warp as wp  # noqa: TID251
 from warp import Function  # noqa: TID251
 
-__all__ = ["Function", "load_modules", "report_modules", "start", "wp"]
+__all__ = ["ON_CPU", "Function", "load_kernels", "report_modules", "start", "wp"]
 
 NO_GPU = b"Could not find or load the NVIDIA CUDA driver"
 """Printed by Warp's native library, past Python, at every start on a machine without a GPU."""
@@ -30,6 +31,9 @@ Kernels loop over an element's four points, ten nodes and three directions. Writ
 as fast and take longer to compile, in Python and in LLVM. On an empty cache, `pytest
 tests/skin/elasticity/test_skin_elasticity.py` takes 28 s of the processor, and 37 with 6 passes.
 """
+
+ON_CPU: dict[str, Any] = {"max_unroll": UNROLLED}
+"""Options of a module that runs on the CPU on every machine: one with a GPU, too, then takes that of a wheel."""
 
 MODULES = {"cpu": 29, "cuda": 37}
 """Modules of kernels that the shipped session's first label takes, by kind of device: others take about as many."""
@@ -60,14 +64,16 @@ def start() -> None:
     _start_quietly()
     if wp.is_cuda_available():
         copy_to_cache(shipped_kernels() / wp.__version__ / GPUS)
-        return
-    wp.config.max_unroll = UNROLLED
+    else:
+        wp.config.max_unroll = UNROLLED
     # The newest kind first: objects for an older one would waste its wide registers.
     for processor in processors():
         shipped = shipped_kernels() / wp.__version__ / processor
         if shipped.is_dir() and wp.config.cpu_compiler_flags:
             flags = wp.config.cpu_compiler_flags
-            wp.config.cpu_compiler_flags = flags.replace("-march=native", f"-target-cpu {processor}")
+            ON_CPU["cpu_compiler_flags"] = flags.replace("-march=native", f"-target-cpu {processor}")
+            if not wp.is_cuda_available():  # they are part of the names of modules for GPUs
+                wp.config.cpu_compiler_flags = ON_CPU["cpu_compiler_flags"]
             copy_to_cache(shipped)
             break
 
@@ -85,9 +91,9 @@ def report_modules(loaded: Callable[[int, int], None]) -> Iterator[None]:
         wp.config.log_level = level
 
 
-def load_modules(modules: Collection[wp.Module], device: str) -> None:
-    """Compile or load modules of kernels side by side, by a few threads."""
-    some = list(modules)
+def load_kernels(kernels: Iterable[wp.Kernel], device: str) -> None:
+    """Compile or load kernels side by side, by a few threads: one after another they keep the first press waiting."""
+    some = list({kernel.module for kernel in kernels})
     for start in range(0, len(some), TOGETHER):
         wp.force_load(device, some[start : start + TOGETHER], max_workers=TOGETHER)
         if isinstance(logger := wp.get_logger(), _ModuleCount):
@@ -104,7 +110,7 @@ class _ModuleCount:
     def info(self, message: str) -> None:
         if message.lstrip().startswith("Module ") and " load on device " in message:
             self._count += 1
-            # Whoever listens may not be called from another thread, such as those of `load_modules`.
+            # Whoever listens may not be called from another thread, such as those of `load_kernels`.
             if threading.current_thread() is threading.main_thread():
                 self.report()
 

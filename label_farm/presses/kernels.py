@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tacdata import registry
@@ -63,7 +64,7 @@ def press_all() -> None:
 
 
 def compile_all(folder: str, shapes: Sequence[Indenter] = (), architectures: Sequence[int] = ARCHITECTURES) -> None:
-    """Compile for GPUs what labels need, by default of every shape that ships; a process of its own.
+    """Compile for GPUs what a batch of labels needs, by default of every shape that ships; a process of its own.
 
     Args:
         folder: Receives a folder for each module.
@@ -74,8 +75,7 @@ def compile_all(folder: str, shapes: Sequence[Indenter] = (), architectures: Seq
 
     # Before any kernel is declared: modules then have the names that a machine with a GPU asks for.
     wp.config.max_unroll = UNROLLED_ON_GPU
-    from tacdata.skin.derivatives.contact_kernel import friction_change, normal_change_kernel
-    from tacdata.skin.elasticity.averaged_kernels import averaged_kernels
+    from tacdata.skin.derivatives.compilation import derivative_kernels
     from tacdata.skin.press import PressRequest
     from tacdata.skin.solve.compilation import batch_kernels
     from tacdata.skin.solve.meshed_skin import MeshedSkin
@@ -83,12 +83,13 @@ def compile_all(folder: str, shapes: Sequence[Indenter] = (), architectures: Seq
 
     skin = MeshedSkin(default_sensor(), ModelSettings())
     surfaces = skin.surfaces([PressRequest(shape, 0.0, 0.0, 0.0, _DEPTHS) for shape in shapes or _shapes()])
-    # Deviations of a label take derivatives, in double precision.
-    exact = averaged_kernels(skin.body.law, wp.float64)
-    changes = [normal_change_kernel(distance) for surface in surfaces for distance in surface.distances.values()]
-    kernels = [*batch_kernels(skin.body, surfaces), exact.product, exact.dilatation_change, friction_change, *changes]
-    for module in {kernel.module for kernel in kernels}:
+    kernels = (*batch_kernels(skin.body, surfaces), *derivative_kernels(skin.body, surfaces))
+
+    def compile_one(module: wp.Module) -> None:
         wp.compile_aot_module(module, arch=architectures, module_dir=Path(folder, module.get_module_identifier()))
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(compile_one, {kernel.module for kernel in kernels}))
 
 
 def _shapes() -> list[Indenter]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import cached_property
@@ -118,13 +119,13 @@ class SkinModel:
         observe: PathRecorder | None = None,
         coarse: Sequence[CoarsePress | None] | None = None,
     ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
-        """Solve presses, many at a time.
+        """Solve presses, many at a time; one that is given up is tried once more.
 
         Args:
             requests: The presses.
             capacity: How many presses are in work at a time.
             with_displacement: Whether states hold displacements.
-            observe: Receives every equilibrium on the way, if given.
+            observe: Receives every equilibrium on the way, if given; then no press is tried again.
             coarse: The companion's results (`solve_coarsely`), from which load steps start.
 
         Yields:
@@ -145,10 +146,36 @@ class SkinModel:
         for group in [[press] for press in possible] if self.settings.alone else [possible]:
             if self.settings.alone:
                 self.skin.forget()
-            batch = self.skin.batch([request for _, request in group], min(capacity, len(group)))
-            presses = (replace(self.skin.placed(number, request), coarse=starts[number]) for number, request in group)
-            yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement), observe)
-            self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
+            found, lost = Counter[int](), set[int]()
+            for number, depth, state in self._walk(group, starts, capacity, with_displacement, observe):
+                if isinstance(state, SolveError) and observe is None:
+                    lost.add(number)
+                else:
+                    found[number] += 1
+                    yield number, depth, state
+            left = [press for press in group if press[0] in lost]
+            for number, depth, state in self._walk(left, starts, capacity, with_displacement, again=True):
+                # States that the first attempt has found are out already.
+                found[number] -= 1
+                if found[number] < 0 or isinstance(state, SolveError):
+                    yield number, depth, state
+
+    def _walk(
+        self,
+        presses: Sequence[tuple[int, PressRequest]],
+        starts: Sequence[CoarseStart | None],
+        capacity: int,
+        with_displacement: bool,
+        observe: PathRecorder | None = None,
+        again: bool = False,
+    ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
+        """Solve numbered presses as one batch; yields as `states_many`."""
+        if not presses:
+            return
+        batch = self.skin.batch([request for _, request in presses], min(capacity, len(presses)), again)
+        placed = (replace(self.skin.placed(number, request), coarse=starts[number]) for number, request in presses)
+        yield from batch.run(placed, lambda found: self.skin.reader.states(found, with_displacement), observe)
+        self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
 
     @cached_property
     def _transfer(self) -> MeshTransfer | None:

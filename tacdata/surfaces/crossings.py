@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.warp_runtime import wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
+from tacdata.warp_runtime import ON_CPU, wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
 
 
 @wp.func
@@ -27,7 +27,7 @@ def _pierces(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
     return wp.min(wp.min(u, v), w) > wp.float64(-1.0e-9)
 
 
-@wp.kernel(module="unique", enable_backward=False)
+@wp.kernel(module="unique", module_options=ON_CPU, enable_backward=False)
 def _cross(
     mesh: wp.uint64,
     vertices: wp.array(dtype=wp.vec3d),

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.warp_runtime import wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
+from tacdata.warp_runtime import ON_CPU, wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
 
 
-@wp.kernel(module="unique", enable_backward=False)
+@wp.kernel(module="unique", module_options=ON_CPU, enable_backward=False)
 def _query(
     mesh: wp.uint64,
     points: wp.array(dtype=wp.vec3),

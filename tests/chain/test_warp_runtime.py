@@ -1,5 +1,6 @@
 """Warp starts without a word about a card that is not there, and says everything else."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -62,9 +63,9 @@ from tacdata import warp_runtime
 from tacdata.chain.memory_kernels import _filter
 with warp_runtime.report_modules(lambda *modules: print(*modules)):
     for _ in range(2):
-        warp_runtime.load_modules({_filter.module}, "cpu")
+        warp_runtime.load_kernels([_filter], "cpu")
 _filter.module.unload()
-warp_runtime.load_modules({_filter.module}, "cpu")
+warp_runtime.load_kernels([_filter], "cpu")
 """
 
 
@@ -102,19 +103,38 @@ BUILT = """
 from tacdata.warp_runtime import UNROLLED_ON_GPU, wp
 wp.config.max_unroll = UNROLLED_ON_GPU
 """
-NAME = """
-import sys, warp as wp
-from tacdata.chain.memory_kernels import _filter
-[built] = wp.compile_aot_module(_filter.module, arch=90, module_dir=sys.argv[1])
-print(built.name)
+PLAIN = "import tacdata.warp_runtime"
+NAMES = """
+import json, sys, warp as wp
+from types import SimpleNamespace
+from tacdata.indenters.sphere import Sphere
+from tacdata.skin.derivatives.compilation import derivative_kernels
+from tacdata.skin.materials import load_law
+from tacdata.skin.solve.compilation import batch_kernels
+from tacdata.skin.surface.depth_map_kernel import HIGHEST
+from tacdata.skin.surface.pressed_shape import _laying_kernel
+from tacdata.skin.validity.law_evaluation import _kernel
+sphere = Sphere(1.0).distance_function()
+skin, surface = (SimpleNamespace(averages=True, law="neo_hookean"),
+    SimpleNamespace(distances={0.0: sphere}, flat=False, rough=True))
+of_gpu = [*batch_kernels(skin, [surface]), *derivative_kernels(skin, [surface])]
+of_cpu = [_laying_kernel(sphere), _kernel(type(load_law("neo_hookean")), wp.float64), HIGHEST["cpu"]]
+[built] = wp.compile_aot_module(HIGHEST["cuda"].module, arch=90, module_dir=sys.argv[1])
+print(json.dumps([built.name, sorted({kernel.module.get_module_identifier() for kernel in of_gpu}),
+    [kernel.module.get_module_identifier(block_dim=1) for kernel in of_cpu]]))
 """
 
 
-def test_a_module_made_without_a_card_has_the_name_that_a_machine_with_one_asks_for(tmp_path):
-    names = []
-    for number, code in enumerate((ASKED, BUILT)):
-        command = [sys.executable, "-c", code + NAME, str(tmp_path / str(number))]
-        places = {"WARP_CACHE_PATH": str(tmp_path / "cache"), "TACDATA_KERNELS": str(tmp_path / "none")}
+def test_modules_made_without_a_gpu_have_the_names_that_a_machine_with_one_asks_for(tmp_path):
+    for kind in warp_runtime.processors():
+        (tmp_path / "kernels" / wp.__version__ / kind).mkdir(parents=True)
+    # A wheel's modules for GPUs are made where there is none, and without those for processors.
+    names = {}
+    for start, kernels in ((ASKED, "kernels"), (BUILT, "none"), (PLAIN, "kernels")):
+        command = [sys.executable, "-c", start + NAMES, str(tmp_path / "built")]
+        places = {"WARP_CACHE_PATH": str(tmp_path / "cache"), "TACDATA_KERNELS": str(tmp_path / kernels)}
         done = subprocess.run(command, env={**os.environ, **places}, capture_output=True, text=True, check=True)
-        names.append(done.stdout.strip())
-    assert names[0] == names[1] and names[0].endswith(".sm90.cubin")
+        names[start] = json.loads(done.stdout.splitlines()[-1])
+    asked, built, plain = names[ASKED], names[BUILT], names[PLAIN]
+    assert asked[:2] == built[:2] and asked[0].endswith(".sm90.cubin") and len(asked[1]) > 20
+    assert wp.is_cuda_available() or asked[2] == plain[2]

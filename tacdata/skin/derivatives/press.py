@@ -11,6 +11,7 @@ import torch
 
 from tacdata.errors import SolveError
 from tacdata.skin.derivatives.bonding import Bonding
+from tacdata.skin.derivatives.compilation import derivative_kernels
 from tacdata.skin.derivatives.contact import ConditionsChange
 from tacdata.skin.derivatives.equilibria import TOLERANCE, PathDerivatives, Slack
 from tacdata.skin.derivatives.parameter_names import check, known
@@ -20,6 +21,7 @@ from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.equilibrium import Equilibrium
 from tacdata.skin.solve.passage import Passage, PathRecorder
 from tacdata.skin.surface.depth_map import DepthRaster
+from tacdata.warp_runtime import load_kernels
 
 if TYPE_CHECKING:
     from tacdata.skin.model import SkinModel
@@ -94,7 +96,10 @@ def sensitivities(
     at_touch = _without_depth(names, changes)
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
     weight = None if spreads is None else torch.tensor(spreads, dtype=torch.float64, device=model.device)
-    derivatives = PathDerivatives(skin.newton([request]), skin.free, label, tolerance, _slack(model, names), weight)
+    newton = skin.newton([request])
+    if model.device != "cpu":
+        load_kernels(derivative_kernels(skin.body, newton.surfaces), model.device)
+    derivatives = PathDerivatives(newton, skin.free, label, tolerance, _slack(model, names), weight)
     for passage in _passed(model, request) if passages is None else passages:
         for reached in passage.reached:
             derivatives.advance(reached, changes if derivatives.changes else at_touch)

@@ -1,4 +1,4 @@
-"""The kernels of a batch on a GPU, compiled side by side: one after another they keep the first press waiting."""
+"""The kernels of a batch on a GPU, which are compiled side by side and ship in a wheel."""
 
 from __future__ import annotations
 
@@ -15,15 +15,10 @@ from tacdata.skin.elasticity.averaged_volume import mass_kernel
 from tacdata.skin.elasticity.body import Elasticity, element_kernels
 from tacdata.skin.linear import constraint_kernels, cuda_cg_kernels
 from tacdata.skin.linear.sweep_kernels import invert_kernel, sweep_kernels
-from tacdata.warp_runtime import load_modules, wp
+from tacdata.warp_runtime import wp
 
 _WORK, _EXACT = wp.float32, wp.float64
 """Precisions of products with the tangent, and of forces."""
-
-
-def compile_kernels(body: Elasticity, surfaces: Sequence[ContactSurface], device: str) -> None:
-    """Compile or load what a batch of this body and these contacts needs; what is loaded costs nothing."""
-    load_modules({kernel.module for kernel in batch_kernels(body, surfaces)}, device)
 
 
 def batch_kernels(body: Elasticity, surfaces: Sequence[ContactSurface]) -> Iterator[wp.Kernel]:

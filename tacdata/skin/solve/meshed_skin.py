@@ -28,14 +28,16 @@ from tacdata.skin.mesh.build import build_mesh
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.batch import Batch, PlacedPress
-from tacdata.skin.solve.compilation import compile_kernels
+from tacdata.skin.solve.compilation import batch_kernels
 from tacdata.skin.solve.equilibrium import StateReader
 from tacdata.skin.solve.load_path import LoadPath
 from tacdata.skin.solve.newton import Newton
+from tacdata.skin.solve.second_attempt import SecondAttempt
 from tacdata.skin.solve.settings import ModelSettings, SolverSettings
 from tacdata.skin.surface.outer_face import OuterFace
 from tacdata.skin.surface.protrusion_pressure import ProtrusionRaster
 from tacdata.skin.surface.traction_map import TractionRaster
+from tacdata.warp_runtime import load_kernels
 
 _FIRST = 0.3
 """Longest first load step over the smallest radius of curvature of the shape [1]."""
@@ -139,19 +141,23 @@ class MeshedSkin:
             pressed = ContactSurface(*arguments, self.settings.stick)
         return (pressed, self.board) if self.board else (pressed,)
 
-    def newton(self, requests: Sequence[PressRequest]) -> Newton:
-        """Return the solver of presses by the shapes of ``requests``; its preconditioner serves one batch at a time."""
+    def newton(self, requests: Sequence[PressRequest], again: bool = False) -> Newton:
+        """Return the solver of presses by the shapes of ``requests``; its preconditioner serves one batch at a time.
+
+        ``again``: of presses that were given up.
+        """
         surfaces = self.surfaces(requests)
         preconditioner = ConstraintPreconditioner(self.rest, surfaces, self.sensor.material.youngs_modulus)
-        return Newton(self.body, surfaces, self._held, preconditioner, self._solver)
+        method = SecondAttempt if again else Newton
+        return method(self.body, surfaces, self._held, preconditioner, settings=self._solver)
 
-    def batch(self, requests: Sequence[PressRequest], capacity: int) -> Batch:
-        """Return an idle batch for presses by the shapes of ``requests``, so many at a time."""
+    def batch(self, requests: Sequence[PressRequest], capacity: int, again: bool = False) -> Batch:
+        """Return an idle batch for presses by the shapes of ``requests``, so many at a time; `again`: see `newton`."""
         # The board just touches the tips of the undeformed protrusions.
         idle, floor = self._under(requests[0]).on(self.device), -self.sensor.skin.protrusion_tip
-        newton = self.newton(requests)
+        newton = self.newton(requests, again)
         if self.device != "cpu":
-            compile_kernels(self.body, newton.surfaces, self.device)
+            load_kernels(batch_kernels(self.body, newton.surfaces), self.device)
         return Batch(newton, idle, len(self.mesh.nodes), capacity, floor)
 
     def _board(self) -> ContactSurface:

@@ -13,7 +13,7 @@ import torch
 
 from tacdata.errors import UsageError
 from tacdata.skin.mesh.skin_mesh import SkinMesh
-from tacdata.skin.surface.depth_map_kernel import NOTHING, highest
+from tacdata.skin.surface.depth_map_kernel import HIGHEST, NOTHING
 from tacdata.skin.surface.pressed_shape import PressedShape
 from tacdata.warp_runtime import wp
 
@@ -113,9 +113,9 @@ class DepthRaster:
     def _scan(self, u: torch.Tensor, height: torch.Tensor, touching: torch.Tensor, share: torch.Tensor) -> None:
         fields = [wp.from_torch(field) for field in (height, touching, share)]
         wp.launch(
-            highest,
+            HIGHEST[self._device.split(":")[0]],
             dim=(len(self._faces), u.shape[2]),
-            inputs=[self._nodes, self._faces, wp.from_torch(u.detach()), self._x, self._y, *fields],
+            inputs=[self._nodes, self._faces, wp.from_torch(u.detach().double()), self._x, self._y, *fields],
             device=self._device,
         )
 

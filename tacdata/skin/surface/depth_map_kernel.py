@@ -12,9 +12,7 @@ sample at most once. Where it does not, or where the triangle bends strongly, th
 
 from __future__ import annotations
 
-from typing import Any
-
-from tacdata.warp_runtime import wp
+from tacdata.warp_runtime import ON_CPU, wp
 
 NOTHING = wp.constant(-1.0e30)
 """Height of a sample without a triangle [mm]."""
@@ -31,9 +29,8 @@ def _flat(a: wp.vec3d):
 
 
 @wp.func
-def _position(nodes: wp.array(dtype=wp.vec3d), u: wp.array3d(dtype=Any), node: wp.int32, state: wp.int32):
-    displacement = wp.vec3d(wp.float64(u[node, 0, state]), wp.float64(u[node, 1, state]), wp.float64(u[node, 2, state]))
-    return nodes[node] + displacement
+def _position(nodes: wp.array(dtype=wp.vec3d), u: wp.array3d(dtype=wp.float64), node: wp.int32, state: wp.int32):
+    return nodes[node] + wp.vec3d(u[node, 0, state], u[node, 1, state], u[node, 2, state])
 
 
 @wp.func
@@ -159,11 +156,10 @@ def _of_touching(marks: wp.array2d(dtype=wp.float64), faces: wp.array2d(dtype=wp
     return total
 
 
-@wp.kernel(module="unique", enable_backward=False)
-def highest(
+def _highest(
     nodes: wp.array(dtype=wp.vec3d),
     faces: wp.array2d(dtype=wp.int32),
-    u: wp.array3d(dtype=Any),
+    u: wp.array3d(dtype=wp.float64),
     xs: wp.array(dtype=wp.float64),
     ys: wp.array(dtype=wp.float64),
     height: wp.array3d(dtype=wp.float64),
@@ -227,3 +223,10 @@ def highest(
                     wp.atomic_max(height, i, j, state, at[2])
                 elif at[2] > height[i, j, state] - margin:
                     wp.atomic_max(share, i, j, state, _of_touching(touching, faces, face, state, at))
+
+
+HIGHEST = {
+    "cpu": wp.kernel(_highest, enable_backward=False, module="unique", module_options=ON_CPU),
+    "cuda": wp.kernel(_highest, enable_backward=False, module="unique"),
+}
+"""The kernel for a kind of device: labels take their maps on the CPU, derivatives on the model's device."""

@@ -24,7 +24,7 @@ import numpy as np
 import torch
 
 from tacdata.indenters import Indenter
-from tacdata.warp_runtime import wp
+from tacdata.warp_runtime import ON_CPU, wp
 
 _Parameters = wp.types.vector(length=8, dtype=wp.float64)
 
@@ -81,7 +81,7 @@ def around(share: np.ndarray, slots: np.ndarray) -> np.ndarray:
 def _laying_kernel(distance: wp.Function) -> wp.Kernel:
     """Compile the kernel for one shape."""
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @wp.kernel(module="unique", module_options=ON_CPU, enable_backward=False)
     def laying(
         x: wp.array(dtype=wp.float64),
         y: wp.array(dtype=wp.float64),

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.skin.constitutive import kinematics
 from tacdata.skin.materials.law import Gradient, Law
-from tacdata.warp_runtime import wp
+from tacdata.warp_runtime import ON_CPU, wp
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def _kernel(kind: type[Law], real: type) -> wp.Kernel:
     mat33, numbers = kinematics.matrix(real), kinematics.parameters(real)
     energy_of, stress_of, tangent_of = kind.functions(real)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @wp.kernel(module="unique", module_options=ON_CPU, enable_backward=False)
     def values(
         H: wp.array(dtype=mat33),
         D: wp.array(dtype=mat33),

@@ -12,6 +12,8 @@ from tacdata.indenters.sphere import Sphere
 from tacdata.skin.member.conditions import conditions
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
+from tacdata.skin.solve import load_path, newton
+from tacdata.skin.solve.passage import PathRecorder
 
 SPHERE = Sphere(2.0)
 PATH = (0.0, 0.25, 0.5, 0.25, 0.0)
@@ -226,6 +228,22 @@ def test_a_press_that_does_not_converge_says_how_far_it_came(slab):
     model = SkinModel(slab.sensor, replace(slab.settings, solver=hasty), mesh=slab.mesh)
     with pytest.raises(SolveError, match=r"no equilibrium beyond depth .* Newton iterations"):
         model.solve(press((0.3,)))
+
+
+def test_a_press_that_is_given_up_is_tried_again(slab, monkeypatch):
+    """Elements that may be pressed to 0.8 of their volume stop it; a third of that does not. No state comes twice."""
+    requests = [press((0.1, 0.6, 0.2)), press((0.1,))]
+    free = dict(slab.solve_many(requests, 2))
+    monkeypatch.setattr(newton, "_LEAST_VOLUME", 0.8)
+    monkeypatch.setattr(load_path, "_LEAST_STEP", 0.1)
+    found = list(slab.states_many(requests, 2))
+    assert sorted((number, depth) for number, depth, _ in found) == [(0, 0.1), (0, 0.2), (0, 0.6), (1, 0.1)]
+    depths = [depth for number, depth, _ in found if number == 0]
+    forces = np.array([state.force for number, _, state in found if number == 0])
+    assert depths == [0.1, 0.6, 0.2] and np.abs(forces - free[0].force).max() < 2e-3 * np.abs(forces).max()
+    # A coarser mesh's press ends where it always did.
+    *_, (number, _, failure) = slab.states_many(requests[:1], observe=PathRecorder())
+    assert number == 0 and isinstance(failure, SolveError)
 
 
 def test_the_models_version_follows_what_decides_a_result(slab, rough_slab):

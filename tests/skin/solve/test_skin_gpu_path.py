@@ -8,13 +8,16 @@ from skin_examples import EXACT, PLAIN, box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
+from tacdata.skin.derivatives.compilation import derivative_kernels
+from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.linear import constraint_preconditioner
 from tacdata.skin.linear.constraint_solvers import InvertedCompliance
 from tacdata.skin.linear.rest_stiffness import DenseRest, rest_stiffness
 from tacdata.skin.mesh.build import MeshSettings, build_mesh
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve import compilation, meshed_skin
+from tacdata.skin.solve import meshed_skin
+from tacdata.skin.solve.compilation import batch_kernels
 from tacdata.warp_runtime import wp
 
 
@@ -64,19 +67,23 @@ def test_presses_on_a_slab_agree(as_on_a_gpu):
     both_ways_agree(sensor, box_mesh(sensor, 6, 6, 2), requests, as_on_a_gpu)
 
 
-def test_all_kernels_of_a_batch_are_compiled_before_it(as_on_a_gpu, monkeypatch):
+def test_all_kernels_of_a_batch_and_of_derivatives_are_known_before_them(as_on_a_gpu, monkeypatch):
     as_on_a_gpu()
     sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
     model = SkinModel(sensor, PLAIN, mesh=box_mesh(sensor, 6, 6, 2))
     requests = [PressRequest(shape, 0.0, 0.0, 0.0, (0.1,)) for shape in (Sphere(1.3), FlatPunch(0.9, 0.3))]
-    compiled, used, launch = set(), set(), wp.launch
-    monkeypatch.setattr(compilation, "load_modules", lambda modules, device: compiled.update(modules))
-    compilation.compile_kernels(model.skin.body, model.skin.newton(requests).surfaces, "cpu")
+    body, surfaces = model.skin.body, model.skin.newton(requests).surfaces
+    batch = {kernel.module for kernel in batch_kernels(body, surfaces)}
+    derivatives = {kernel.module for kernel in derivative_kernels(body, surfaces)}
+    used, launch = set(), wp.launch
+    monkeypatch.setattr(type(body), "prepared", lambda self: None)
     monkeypatch.setattr(
         wp, "launch", lambda kernel, *more, **named: (used.add(kernel.module), launch(kernel, *more, **named))
     )
     assert len(list(model.states_many(requests, 2))) == 2
-    assert len(used) > 15 and used <= compiled
+    assert len(used) > 15 and used <= batch
+    assert len(list(sensitivities(model, requests[0], ["x", "youngs_modulus"]))) == 1
+    assert len(used - batch) > 4 and used <= batch | derivatives
 
 
 def test_labels_that_start_from_a_coarser_mesh_agree(as_on_a_gpu):
