@@ -165,3 +165,37 @@ def cycle_in_the_head(folder: Path) -> None:
     """A gauge's numbers of rows, and its sampling cycle in the head."""
     cells = [[str(k), *row[1:]] for k, row in enumerate(texts(presses()))]
     write(folder, cells, ("No.", *NAMES[1:]), head="Model,LK\nSampling Cycle(s),0.05\n\n")
+
+
+@measured(6, told="each name comes again")
+def runs_by_number(folder: Path) -> None:
+    """Two runs side by side; their number stands behind name and unit, and an empty column between them."""
+    first, second = presses(), presses(seed=1)
+    names = [f"{name} Run #{k}" for k in (1, 2) for name in ("Time (s)", "Position (mm)", "c0 (pF)", "c1 (pF)")]
+    cells = [[*a, "", *b] for a, b in zip(texts(first), texts(second), strict=True)]
+    write(folder, cells, (*names[:4], "", *names[4:]))
+
+
+@measured(1, needed="wraps")
+def packets_lost(folder: Path) -> None:
+    """Numbers of packets that wrap at 256, ten of them lost; the rate stands in a comment."""
+    rows = np.delete(presses(), np.arange(105, 115), axis=0)
+    count = np.delete(np.arange(300), np.arange(105, 115)) % 256
+    cells = [[str(k), *row[1:]] for k, row in zip(count, texts(rows), strict=True)]
+    write(folder, cells, ("pkt", *NAMES[1:]), head="# sample rate 20 Hz\n")
+
+
+@measured(8)
+def arrays_by_number(folder: Path) -> None:
+    """A wrench and a place as numbered columns: no channels."""
+    rows = presses()
+    names = ["t [s]", *(f"FT_{k}" for k in range(6)), *(f"pos_{k}" for k in range(3)), "c0 [pF]", "c1 [pF]"]
+    still = np.zeros((len(rows), 2))
+    wrench = np.column_stack([still, _force(rows), still, still[:, :1]])
+    write(folder, np.column_stack([rows[:, 0], wrench, still, 80 - rows[:, 1], rows[:, 2:]]), tuple(names))
+
+
+@measured(6)
+def names_in_an_array(folder: Path) -> None:
+    """A matrix, and the names of its columns in an array of texts."""
+    np.savez(folder / "run.npz", data=presses(), labels=np.array(NAMES))

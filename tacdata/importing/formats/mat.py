@@ -100,6 +100,8 @@ def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
         if _are_columns(value):
             return {name or "array": np.stack([np.asarray(entry, float) for entry in value], axis=1)}
     array = np.asarray(value)
+    if array.dtype.hasobject and all(isinstance(entry, str) for entry in array.flat):
+        array = array.astype(str)
     if array.dtype.kind in "biufMSU":
         return {name or "array": array}
     lost.append(name or "array")

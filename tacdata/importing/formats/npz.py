@@ -54,7 +54,7 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: ReadOptions) -> 
     arrays, remarks = _upright(path, arrays, options)
     if options.trial_axis is not None:
         arrays = _below_each_other(path, arrays, options.trial_axis)
-    flat = _flat(arrays)
+    flat = _named(_flat(arrays))
     columns = {name: _column(array) for name, array in flat.items() if array.size > 1}
     if not columns:
         return SourceTable(path, {})
@@ -72,6 +72,17 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: ReadOptions) -> 
         notes.append(f"{path.name}: not of {rows} rows, left out: {', '.join(dropped)}")
     units = {name: "ns" for name, array in flat.items() if array.dtype.kind in "mM"}
     return SourceTable(path, selection, units, frozenset(units), tuple(notes))
+
+
+def _named(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return arrays with the columns of a table by their names, if an array of as many different texts gives them."""
+    texts = [np.squeeze(array).astype(str).tolist() for array in arrays.values() if array.dtype.kind in "SU"]
+    named: dict[str, np.ndarray] = {}
+    for name, array in arrays.items():
+        width = array.shape[1] if array.ndim == 2 and array.dtype.kind in "biuf" else 0
+        names = [each for each in texts if isinstance(each, list) and len(set(each)) == len(each) == width > 1]
+        named |= dict(zip(names[0], array.T, strict=True)) if len(names) == 1 else {name: array}
+    return named
 
 
 def _upright(

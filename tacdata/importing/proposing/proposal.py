@@ -212,7 +212,7 @@ def _unused(kinds: tuple[SourceKind, ...], used: set[Any], wide: SourceKind) -> 
     known = {name for names in wide.roles.values() for name in names}
     for name, values in wide.table.columns.items():
         texts = {str(value) for value in values.tolist()} if values.dtype == object and name not in known else set()
-        if 2 * len(texts) > wide.table.rows:
+        if 2 * len(texts) > wide.table.rows and not re.search(r"\.[A-Za-z]\w{1,4}$", min(texts)):  # names of images
             questions.append(
                 f"{name} holds text, as {min(texts)[:40]!r}, and is not used: if these are readings, save them as "
                 "numbers, a column each"

@@ -75,6 +75,8 @@ GUESSES = {
 """Meaning of a column by its name without the unit."""
 PLACE = r"(pos(ition)?s?|pose|xyz|(tip|tcp|probe|indenter|stage|eef?|end_?effector|robot)(_?pos(e|ition)?)?)"
 """Name of an array whose first three columns are a place."""
+PARTS = (3, 6, 7)
+"""Columns of a place, and of a place with an orientation."""
 WRENCH = r"wrench|f(orce)?_?(/|_|and)?_?t(orque)?|force_?torque|(\w+_)?(ft|wrench)_?(sensor|data)?"
 """Name of an array whose first three columns are a force, and the others a torque."""
 TORQUE = re.compile(
@@ -108,10 +110,11 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
     roles: dict[str, list[str]] = {"channels": []}
     later = later_blocks(table)
     lettered = are_letters(list(table.columns))
+    numbered = _numbered(list(table.columns))
     for name, values in table.columns.items():
         if name in later or (values.dtype.kind == "f" and np.isnan(values).all()):
             continue  # a comma at the end of each row makes an empty one
-        role = None if lettered and values.dtype != object else _role(table, name, values)
+        role = None if lettered and values.dtype != object else numbered.get(name) or _role(table, name, values)
         if role in ("place", "wrench"):
             parts = "xyz" if role == "place" else ("force",) * 3 + ("torque",) * 3
             for number, part in enumerate(parts):
@@ -150,18 +153,35 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
     return roles
 
 
+def _numbered(names: list[str]) -> dict[str, str]:
+    """Return the roles of columns that are an array's, each with its number, as pos_1 to pos_3 or FT[0] to FT[5]."""
+    arrays: dict[str, list[str]] = {}
+    for name in names:
+        if match := re.fullmatch(r"(.+?)[_.]?[\[(]?\d[\])]?", name):
+            arrays.setdefault(bare_name(match[1]), []).append(name)
+    roles: dict[str, str] = {}
+    for array, parts in arrays.items():
+        if len(parts) in PARTS and re.fullmatch(PLACE, array):
+            roles |= dict(zip(parts, ("x", "y", "z", *["orientation"] * 4), strict=False))
+        elif len(parts) == 6 and re.fullmatch(WRENCH, array):
+            roles |= dict(zip(parts, (*["force"] * 3, *["torque"] * 3), strict=True))
+    return roles
+
+
 def later_blocks(table: SourceTable) -> frozenset[str]:
     """Return the columns of all blocks but the first, where each name, the clock's too, comes again with a number.
 
     So it is with trials side by side: t, depth, t.1, depth.1, or t_1, depth_1, t_2, depth_2, or A t, A depth, B t.
     """
+    filled = [name for name, values in table.columns.items() if values.dtype.kind != "f" or not np.isnan(values).all()]
     for pattern in AGAIN:
         blocks: dict[str, list[str]] = {}
-        for name in table.columns:
+        for name in filled:
             match = pattern.fullmatch(name if pattern is AGAIN[0] else split_unit(name)[0])
             blocks.setdefault(match[1] if match else name, []).append(name)
         times_given = {len(names) for names in blocks.values()}
-        clocks = [base for base in blocks if re.fullmatch(GUESSES["time"], bare_name(base))]
+        words = {base: [bare_name(base), *bare_name(base).split("_")] for base in blocks}
+        clocks = [base for base in blocks if any(re.fullmatch(GUESSES["time"], word) for word in words[base])]
         if clocks and len(blocks) > 1 and len(times_given) == 1 and times_given != {1}:
             return frozenset(name for names in blocks.values() for name in names[1:])
     return frozenset()
@@ -197,7 +217,7 @@ def bare_name(name: str) -> str:
 
 def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
     bare, inside = bare_name(name), split_unit(name.rsplit(".", 1)[-1])[1]
-    if values.ndim == 2 and values.shape[1] in (3, 6, 7) and re.fullmatch(PLACE, bare):
+    if values.ndim == 2 and values.shape[1] in PARTS and re.fullmatch(PLACE, bare):
         return "place"
     if values.ndim == 2 and values.shape[1] == 6 and re.fullmatch(WRENCH, bare):
         return "wrench"

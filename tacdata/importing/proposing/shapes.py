@@ -83,7 +83,7 @@ def _reason(table: SourceTable, name: str, policy: ShapePolicy) -> str:
 
 def counting_column(table: SourceTable, roles: dict[str, list[str]], policy: ShapePolicy = POLICY) -> str:
     """Return a column that counts the rows of a device and shows by a gap or a restart where some are lost; else ""."""
-    for name in roles.get("counter", []):
+    for name in (*roles.get("counter", []), *roles.get("idle", [])):
         values = table.column(name)
         steps = np.diff(values.astype(float)) if values.dtype != object and values.ndim == 1 else np.empty(0)
         if len(steps) and policy.counts <= (steps == 1).mean() < 1:

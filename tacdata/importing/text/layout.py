@@ -203,8 +203,16 @@ def _refuse_unclear_signs(rows: list[list[str]], names: tuple[str, ...], origin:
 
 
 def _commented_header(lines: list[str], first: str, delimiter: str, width: int) -> list[list[str]]:
-    """Return the last comment before the data as a header if it has as many fields, as NumPy writes it."""
+    """Return names, and units below them, from comments before the data with as many fields.
+
+    Those behind "columns:" and "units:" come first, then those of the last comment, as NumPy writes it.
+    """
     comments = [line.lstrip().lstrip("#%/").strip() for line in lines[: lines.index(first)] if line.strip()]
+    labelled = {label.lower(): split(fields, delimiter) for label, _, fields in (c.partition(":") for c in comments)}
+    names = [labelled.get(label, []) for label in ("columns", "fields", "names", "channels")]
+    names = next((fields for fields in names if len(fields) == width), None)
+    if names:
+        return [names, *(labelled[label] for label in ("units",) if len(labelled.get(label, ())) == width)]
     fields = split(comments[-1], delimiter) if comments else []
     return [fields] if len(fields) == width else []
 

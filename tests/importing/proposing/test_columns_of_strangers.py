@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 from sources import mapping
 
 from tacdata.chain.at_rest import below_zero, turned, zero_side
@@ -235,3 +236,48 @@ def test_a_word_in_place_of_many_readings_is_asked_about(tmp_path):
 def test_a_letter_in_volts_is_no_depth(tmp_path):
     roles = roles_of(read_table(written(tmp_path, "t [s],z [mm],a [V],d [V]", T, DEPTH, CHANNEL, CHANNEL)))
     assert roles["channels"] == ["a [V]", "d [V]"] and "depth" not in roles
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "Time (s) Run #1,Position (mm) Run #1,Force (N) Run #1,Time (s) Run #2,Position (mm) Run #2,Force (N) Run #2",
+        "S 1 t,S 1 z,S 1 F,,S 2 t,S 2 z,S 2 F",
+    ],
+)
+def test_trials_side_by_side_are_known_by_any_number_in_their_names(tmp_path, names):
+    columns = (T, DEPTH, FORCE, *[np.full(len(T), np.nan)] * names.count(",,"), 2 * T, 1.2 * DEPTH, 3 * FORCE)
+    written(tmp_path, names, *columns)
+    assert any("each name comes again" in q for q in proposed(tmp_path).questions)
+
+
+def test_packets_that_are_lost_are_a_gap_whatever_their_number_is_called(tmp_path):
+    rows = np.setdiff1d(np.arange(200), np.arange(110, 117))
+    written(tmp_path, "# sample rate 20 Hz\npkt,z [mm],Fz [N],c0", rows % 64, DEPTH[rows], FORCE[rows], CHANNEL[rows])
+    found = proposed(tmp_path)
+    assert found.document["files"]["run"]["time"] == {"rate": 20.0, "column": "pkt"}
+
+
+def test_columns_of_an_array_by_number_are_a_place_and_a_wrench(tmp_path):
+    names = ["t", *(f"pos_{k}" for k in (1, 2, 3)), *(f"FT[{k}]" for k in range(6)), "tac_1", "tac_2", "tac_3"]
+    columns = [T, 0 * T, 0 * T, 80 - DEPTH, *[FORCE] * 6, CHANNEL, CHANNEL, CHANNEL]
+    roles = roles_of(read_table(written(tmp_path, ",".join(names), *columns)))
+    assert (roles["z"], roles["force"], roles["torque"]) == (["pos_3"], names[4:7], names[7:10])
+    assert roles["channels"] == names[10:]
+
+
+@pytest.mark.parametrize("form", ["mat", "npz"])
+def test_an_array_of_names_names_the_columns_of_a_table(tmp_path, form):
+    data, names = np.column_stack([T, DEPTH, FORCE, CHANNEL]), ["time (s)", "depth (mm)", "Fz (N)", "c0 (pF)"]
+    if form == "mat":
+        savemat(tmp_path / "run.mat", {"data": data, "labels": np.array(names, dtype=object)})
+    else:
+        np.savez(tmp_path / "run.npz", data=data, labels=np.array(names))
+    assert list(read_table(tmp_path / f"run.{form}").columns) == names
+    assert "2 recordings" in tried(tmp_path, proposed(tmp_path).mapping)
+
+
+def test_comments_may_name_columns_and_units(tmp_path):
+    head = "# columns: height vDeflection seriesTime\n# other: 1 2\n# units: m N s"
+    table = read_table(written(tmp_path, head, -DEPTH / 1000, FORCE, T, name="run.txt", between=" "))
+    assert table.units == {"height": "m", "vDeflection": "N", "seriesTime": "s"}
