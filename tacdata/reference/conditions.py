@@ -17,6 +17,8 @@ FEWEST = 3
 """Presses of a kind that each session needs: their scatter is the noise."""
 POINTS = 120
 """Points of a press on its clock."""
+SIGNAL = 2.0
+"""A base with less variance along the press, over that of its noise, is noise [1]."""
 HALF = 0.5
 """Share of the depth at which clocks are set: the path is steep there [1]."""
 
@@ -50,8 +52,16 @@ class PressKind:
 
     @property
     def range(self) -> np.ndarray:
-        """Range of the base [the source's unit], shape (channels,)."""
-        return np.ptp(self.base, axis=0)
+        """Range of the base [the source's unit], shape (channels,); of one that never moves there, that of all."""
+        base, every = np.ptp(self.base, axis=0), np.ptp(np.concatenate([self.healthy, self.measured]), axis=(0, 1))
+        return np.where(base > 0, base, np.where(every > 0, every, 1.0))
+
+    @property
+    def reliable(self) -> np.ndarray:
+        """Whether the base varies along the press more than by the noise of its mean, shape (channels,), bool."""
+        still = self.healthy - self.healthy.mean(axis=1, keepdims=True)
+        noise = still.var(axis=0, ddof=1).mean(axis=0) / len(still)
+        return self.base.var(axis=0) > SIGNAL * noise
 
     def split(self, first: np.ndarray) -> PressKind:
         """Return the healthy presses alone: some as the reference of the others, for a control."""
@@ -100,22 +110,24 @@ class _Span:
     depth: float
     """[mm]"""
     start: float
-    """When it passes half of its depth on the way in [s]."""
+    """When it first passes half of its depth [s]."""
     pace: float
-    """Time above half of its depth [s]."""
+    """Time until it passes it for the last time [s]."""
 
 
 def _span(course: Course, rows: np.ndarray) -> _Span:
     time, depth = course.time[rows], course.tip[rows, 2]
     low, high = float(depth.min()), float(depth.max())
-    above = np.flatnonzero(depth >= low + HALF * (high - low))
-    first, last = int(above[0]), int(above[-1])
-    start, end = float(time[first]), float(time[last])
     level = low + HALF * (high - low)
-    if first > 0 and depth[first] > depth[first - 1]:
-        # Between two readings: else presses would be aligned to whole periods only.
-        start -= (depth[first] - level) / (depth[first] - depth[first - 1]) * (time[first] - time[first - 1])
-    return _Span(high - low, float(start), end - start)
+    # Either way: of an axis that points the other way a press begins where it is deepest.
+    after = np.flatnonzero(np.diff(depth >= level)) + 1
+    if not len(after):
+        return _Span(high - low, float(time[0]), float(time[-1] - time[0]))
+    # Between two readings: else presses would be aligned to whole periods only.
+    share = (level - depth[after - 1]) / (depth[after] - depth[after - 1])
+    passed = time[after - 1] + share * (time[after] - time[after - 1])
+    end = passed[-1] if len(passed) > 1 else time[-1]
+    return _Span(high - low, float(passed[0]), float(end - passed[0]))
 
 
 def _same(course: Course, names: Sequence[str], spans: list[_Span], a: int, b: int) -> bool:
@@ -146,20 +158,22 @@ def _on_one_clock(
     """Return presses resampled to common times; each point is the mean of the readings around it."""
     lead = min(spans[e].start - course.time[rows[e][0]] for e in group)
     tail = min(course.time[rows[e][-1]] - spans[e].start for e in group)
-    count = int(min(POINTS, np.median([len(rows[e]) for e in group])))
+    step = {e: float(np.median(np.diff(course.time[rows[e]]))) for e in group}
+    coarsest = max(np.median([step[e] for e in group if measured[e] == side]) for side in (False, True))
+    # A machine that is read more often would seem to have less of a filter.
+    rows_of = {e: rows[e][:: max(round(coarsest / step[e]), 1)] for e in group}
+    count = int(min(POINTS, np.median([len(r) for r in rows_of.values()])))
     edges = np.linspace(-lead, tail, count + 1)
-    values = {e: _means(course.time[rows[e]] - spans[e].start, course.readings[rows[e]], edges) for e in group}
-    depths = [
-        _means(course.time[rows[e]] - spans[e].start, course.tip[rows[e], 2:], edges)[:, 0]
-        for e in group
-        if not measured[e]
-    ]
+    since = {e: course.time[r] - spans[e].start for e, r in rows_of.items()}
+    values = {e: _means(since[e], course.readings[r], edges) for e, r in rows_of.items()}
+    depths = [_means(since[e], course.tip[r, 2:], edges)[:, 0] for e, r in rows_of.items() if not measured[e]]
     sides = [np.stack([values[e] for e in group if measured[e] == side]) for side in (False, True)]
     speed = np.abs(np.diff(np.mean(depths, axis=0)) / np.diff(edges[:-1]))
     at = course.tip[rows[group[0]][0], :2]
     name = names[group[0]] or f"x {at[0]:.2g}, y {at[1]:.2g} mm"
     # A way in the air before the contact is no depth; a hold or a rest may last longer than the motion.
-    deep = min(spans[group[0]].depth, float(np.max(depths[0])))
+    deepest = float(np.max(depths[0]))
+    deep = min(spans[group[0]].depth, deepest if deepest > 0 else np.inf)
     label = f"{name}, {deep:.3g} mm deep at {np.median(speed[speed > HALF * speed.max()]):.2g} mm/s"
     middle = 0.5 * (edges[1:] + edges[:-1]) + lead
     return PressKind(label, middle, np.mean(depths, axis=0), *sides, effort=course.effort)

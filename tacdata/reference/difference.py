@@ -10,7 +10,7 @@ from tacdata.chain import Course
 from tacdata.errors import FormatError
 from tacdata.reference.conditions import FEWEST, Matched, PressKind, matched
 from tacdata.reference.evidence import EXCLUSIVE, OFFSET, Posterior, blocks, changing, posterior
-from tacdata.reference.shapes import Shape, shapes
+from tacdata.reference.shapes import LAGGING, Shape, shapes
 
 NAMED = 0.95
 """Probability from which a mechanism is named [1]."""
@@ -30,6 +30,10 @@ NEEDED = 0.15
 """A second name explains at least this share of the difference by itself: less may be form error of the first [1]."""
 WINDOWS = 20
 """Parts of a press whose means are compared, whatever the name."""
+LAGS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1)
+"""Lengths of a delay or a filter that are tried first, over the shortest press [1]..."""
+NEARER = (0.59, 0.71, 0.84, 1.0, 1.19, 1.41, 1.68)
+"""...and then, over the best of them: a curve near another length fits worse than another mechanism's [1]."""
 CLEAR = 0.9
 """A zero that is off explains at least this share by itself: it fits any remainder in part [1]."""
 Z90 = 1.645
@@ -148,21 +152,20 @@ def difference(course: Course, names: Sequence[str], measured: np.ndarray) -> Di
             f"{FEWEST} or more presses of one kind, healthy and not: their scatter is the noise",
             "record the same plan on both, each press several times",
         )
-    columns = [shapes(c) for c in pairs.conditions]
-    belief = posterior(pairs.conditions, columns)
+    lags, columns, belief = _model(pairs.conditions)
     selection = _chosen(columns[0], belief)
     controls, bounds = [], {}
     for split, first in (("first half and second half", _first), ("odd and even presses", _odd)):
         if min(len(c.healthy) for c in pairs.conditions) < 2 * FEWEST:
             continue
         halves = tuple(c.split(first(len(c.healthy))) for c in pairs.conditions)
-        sizes = _mechanisms(halves, [shapes(c) for c in halves], belief, selection, {})
+        sizes = _mechanisms(halves, [shapes(c, lags) for c in halves], belief, selection, {})
         peaks = {(m.name, s.condition, s.channel): abs(s.peak) for m in sizes for s in m.sizes}
         bounds = {key: max(bounds.get(key, 0.0), peaks.get(key, 0.0)) for key in {*bounds, *peaks}}
-        quiet = _compared(replace(pairs, conditions=halves)).status == "none"
+        quiet = _compared(replace(pairs, conditions=halves), *_model(halves)[1:]).status == "none"
         controls.append(Control(split, quiet, max(peaks.values(), default=0.0)))
     # A change within the healthy machine is no change of the other one.
-    answer = _compared(pairs, bounds)
+    answer = _compared(pairs, columns, belief, bounds)
     if answer.named and not all(c.quiet for c in controls):
         answer = replace(answer, status="unknown")
     return replace(answer, controls=tuple(controls))
@@ -198,10 +201,25 @@ def _with_rival(mechanism: str, belief: Posterior) -> tuple[float, str]:
     return joint, next(iter(pair - {mechanism}))
 
 
-def _compared(pairs: Matched, control: dict[tuple[str, str, int], float] | None = None) -> Difference:
+def _model(conditions: tuple[PressKind, ...]) -> tuple[dict[str, np.ndarray], list[list[Shape]], Posterior]:
+    """Return lengths of lags [s], the shapes of each condition with these, and their probabilities."""
+    lags = dict.fromkeys(LAGGING, min(float(np.ptp(c.time)) for c in conditions) * np.array(LAGS))
+    columns = [shapes(c, lags) for c in conditions]
+    support = posterior(conditions, columns).support
+    for name in LAGGING:
+        best = np.argmax([p for p, s in zip(support, columns[0], strict=True) if s.mechanism == name])
+        lags[name] = lags[name][best] * np.array(NEARER)
+    columns = [shapes(c, lags) for c in conditions]
+    return lags, columns, posterior(conditions, columns)
+
+
+def _compared(
+    pairs: Matched,
+    columns: list[list[Shape]],
+    belief: Posterior,
+    control: dict[tuple[str, str, int], float] | None = None,
+) -> Difference:
     conditions = pairs.conditions
-    columns = [shapes(c) for c in conditions]
-    belief = posterior(conditions, columns)
     selection = _chosen(columns[0], belief)
     mechanisms = _mechanisms(conditions, columns, belief, selection, control or {})
     changed = tuple(k for k, m in zip(selection, mechanisms, strict=False) if m.changed)

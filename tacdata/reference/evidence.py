@@ -54,6 +54,8 @@ class Posterior:
     """Shapes of the most probable set, by number."""
     of_shape: tuple[float, ...]
     """Probability of each shape [1]."""
+    support: tuple[float, ...]
+    """Of the best set with each shape: natural logarithm of its evidence and prior mass [1]."""
 
 
 def blocks(presses: np.ndarray) -> np.ndarray:
@@ -76,7 +78,8 @@ def posterior(conditions: tuple[PressKind, ...], columns: list[list[Shape]]) -> 
             # The unnamed remainder has a size of its own in each condition and channel.
             sizes = np.stack([system.evidence(sets) for system in _systems(condition, shapes_of, channel)])
             evidence += logsumexp(sizes, axis=0) - np.log(len(REMAINDERS))
-    weights = softmax(evidence + np.log(mass)[:, None], axis=0)
+    evidence += np.log(mass)[:, None]
+    weights = softmax(evidence, axis=0)
     # Averaged over draws of the blocks, so that one session's accidents decide less; column 0 is the data themselves.
     of_set = weights[:, 1:].mean(axis=1)
     names = [s.mechanism for s in columns[0]]
@@ -84,7 +87,10 @@ def posterior(conditions: tuple[PressKind, ...], columns: list[list[Shape]]) -> 
         n: float(sum(p for p, s in zip(of_set, sets, strict=True) if n in {names[i] for i in s})) for n in names
     }
     each = tuple(float(sum(p for p, s in zip(of_set, sets, strict=True) if k in s)) for k in range(len(names)))
-    return Posterior(probabilities, sets[int(np.argmax(of_set))], each)
+    support = tuple(
+        float(max(e for e, s in zip(evidence[:, 0], sets, strict=True) if k in s)) for k in range(len(names))
+    )
+    return Posterior(probabilities, sets[int(np.argmax(of_set))], each, support)
 
 
 @dataclass(frozen=True)

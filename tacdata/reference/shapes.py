@@ -12,8 +12,10 @@ TURN = 0.25
 """At this share of the fastest speed friction is nearly all there [1]."""
 SMOOTH = 1
 """Points on either side over which speeds and slopes are averaged."""
-MEMORIES, FILTERS, DELAYS = (0.15, 0.5), (0.01, 0.03), (0.003, 0.01, 0.03)
-"""Time constants of memory and of filters, and delays, as shares of the press [1]."""
+MEMORIES = (0.15, 0.5)
+"""Time constants of memory, as shares of the press [1]."""
+LAGGING = ("low_pass_filter", "latency")
+"""Mechanisms with a length in time."""
 FLAT = 0.02
 """A curve that spans less than this share of the base's range is no shape [1]."""
 AGAINST = "while it moves, against the motion"
@@ -37,18 +39,25 @@ class Shape:
     """Size that would not surprise, as a standard deviation [its unit], shape (channels,)."""
 
 
-def shapes(condition: PressKind) -> list[Shape]:
-    """Return all shapes of a condition; those that it does not excite are 0."""
+def shapes(condition: PressKind, lags: dict[str, np.ndarray]) -> list[Shape]:
+    """Return all shapes of a condition; those that it does not excite are 0.
+
+    Args:
+        condition: The condition.
+        lags: Lengths to try of each mechanism of `LAGGING` [s].
+    """
     time, base = condition.time, condition.base
     speed = _smooth(np.gradient(condition.depth, time))
     fastest = max(float(np.abs(speed).max()), 1e-12)
     way = np.tanh(speed / (TURN * fastest))
     moving = np.tanh((speed / (TURN * fastest)) ** 2)
-    # A press begins where the one before ended.
-    last = _last_way(speed / fastest)
+    # A press begins where the one before ended, at either end of the way.
+    start = float(condition.depth[0])
+    inward = float(np.sign(condition.depth[np.argmax(np.abs(condition.depth - start))] - start)) or 1.0
+    last = _last_way(speed / fastest, inward)
     ones = np.ones(base.shape[1])
     slope = _slope(condition.depth, base, speed / fastest)
-    baseline = base[np.argsort(condition.depth, kind="stable")[: max(len(time) // 20, 1)]].mean(axis=0)
+    baseline = base[np.argsort(np.abs(condition.depth - start), kind="stable")[: max(len(time) // 20, 1)]].mean(axis=0)
     span, size = float(time[-1] - time[0]), condition.range
     typical = {
         "reading": TYPICAL * size,
@@ -65,17 +74,20 @@ def shapes(condition: PressKind) -> list[Shape]:
         *(("dry_friction", form, "reading", curve[:, None] * ones) for form, curve in friction),
         ("gain", "of the readings", "1", base - baseline),
         ("z_offset", "of the depth", "mm", slope),
-        ("backlash", "of the drive on its way out", "mm", slope * (last < 0)[:, None]),
+        ("backlash", "of the drive on its way out", "mm", slope * np.where(last == inward, 0.0, -last)[:, None]),
+        ("backlash", "of the drive on its way in", "mm", slope * np.where(last == inward, -last, 0.0)[:, None]),
         ("backlash", "of the drive, half on either way", "mm", slope * -0.5 * last[:, None]),
     ]
     for share in MEMORIES:
         entries.append(("relaxation", f"over {share * span:.2g} s", "1", base - _lagged(base, time, share * span)))
-    for share in FILTERS:
-        lag_shape = (_lagged(base, time, share * span) - base) / (share * span)
-        entries.append(("low_pass_filter", f"near {share * span:.2g} s", "s", lag_shape))
-    for share in DELAYS:
-        lag_shape = np.stack([np.interp(time - share * span, time, column) for column in base.T], axis=1)
-        entries.append(("latency", f"near {share * span:.2g} s", "s", (lag_shape - base) / (share * span)))
+    for name in LAGGING:
+        for lag in lags[name].tolist():
+            late = np.stack([np.interp(time - lag, time, column) for column in base.T], axis=1)
+            late = _lagged(base, time, lag) if name == "low_pass_filter" else late
+            entries.append((name, f"near {lag:.2g} s", "s", (late - base) / lag))
+    # Noise alone, subtracted from itself, would be a gain of -1.
+    quiet = np.where(condition.reliable, 1.0, 0.0)
+    entries = [(*entry[:3], entry[3] * (1.0 if entry[0] == "dry_friction" else quiet)) for entry in entries]
     return [_excited(Shape(*entry, typical[entry[2]]), size) for entry in entries]
 
 
@@ -91,14 +103,11 @@ def _smooth(values: np.ndarray) -> np.ndarray:
     return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
 
 
-def _last_way(speed: np.ndarray) -> np.ndarray:
-    """Return the direction of the last motion, 1 on the way in, shape (t,); at first that of the press before."""
-    ways, last = np.empty(len(speed)), -1.0
-    for k, value in enumerate(speed.tolist()):
-        if abs(value) > STILL:
-            last = float(np.sign(value))
-        ways[k] = last
-    return ways
+def _last_way(speed: np.ndarray, inward: float) -> np.ndarray:
+    """Return the direction of the last motion, 1 to more depth, shape (t,); at first that of the press before."""
+    moving = np.abs(speed) > STILL
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(speed)), -1))
+    return np.where(last < 0, -inward, np.sign(speed[last]))
 
 
 def _slope(depth: np.ndarray, base: np.ndarray, speed: np.ndarray) -> np.ndarray:

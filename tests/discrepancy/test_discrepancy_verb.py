@@ -122,6 +122,14 @@ def test_a_recording_of_many_strokes_is_cut_between_them():
     assert all(a[1] == b[0] for a, b in pairwise(spans))
 
 
+def test_strokes_of_an_axis_that_points_the_other_way_are_the_same():
+    time_ns = np.arange(0, 40_000, 100) * 1_000_000
+    depth = 1 - np.cos(2 * np.pi * time_ns / 1e10)
+    assert strokes(time_ns, 2 - depth) == strokes(time_ns, depth)
+    one = slice(0, 101)
+    assert len(strokes(time_ns[one], 2 - depth[one])) == 1
+
+
 def test_what_is_read_after_the_tip_came_to_rest_counts_where_it_is_off_the_skin():
     """A recovery is read long after the guide's last motion; where the tip rests in the skin, nobody knows how long."""
     time_ns = np.arange(0, 20_000, 100) * 1_000_000

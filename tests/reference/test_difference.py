@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from tacdata import documents
 from tacdata.chain import Course, Tool
@@ -18,8 +19,20 @@ WAY = np.sign(np.gradient(DEPTH, TIME)) * (np.abs(np.gradient(DEPTH, TIME)) > 2)
 HEADING = Machines(("after",), ("before",), "", "A")
 
 
-def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01, effort=None, law=0.006 * DEPTH):
-    """Compare presses of a motor with load, friction and wander; a change acts in the second half of each load."""
+def machine(
+    change,
+    presses=12,
+    loads=("20", "40"),
+    seed=0,
+    wander=0.01,
+    effort=None,
+    law=0.006 * DEPTH,
+    seen=lambda course: course,
+):
+    """Compare presses of a motor with load, friction and wander; a change acts in the second half of each load.
+
+    All presses are recorded as ``seen``: by another convention, or another logger.
+    """
     rng = np.random.default_rng(seed)
     readings, names, measured = [], [], []
     for load in loads:
@@ -46,7 +59,7 @@ def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01, effort=
         specimens=tuple(names),
         effort=effort,
     )
-    return difference(course, course.specimens, np.array(measured))
+    return difference(seen(course), course.specimens, np.array(measured))
 
 
 def late(by):
@@ -72,7 +85,7 @@ def test_a_seeded_fault_is_named_with_its_signed_size(fault):
     assert found.named[0].changed
 
 
-@pytest.mark.parametrize("way_in", [0.0, -0.5], ids=["on the way out", "half on either way"])
+@pytest.mark.parametrize("way_in", [0.0, -0.5, -1.0], ids=["on the way out", "half on either way", "on the way in"])
 def test_play_is_named_wherever_its_zero_was_found(way_in):
     play, last = 4.0, np.where(TIME < 6.0, 1.0, -1.0)
     healthy, late = (0.01 * np.maximum(x - 10.0, 0.0) ** 1.25 for x in (DEPTH, DEPTH + play * (way_in + (last < 0))))
@@ -80,6 +93,56 @@ def test_play_is_named_wherever_its_zero_was_found(way_in):
     assert [m.name for m in found.named] == ["backlash"]
     for s in found.named[0].changed:
         assert s.value == pytest.approx(play, rel=0.2)
+
+
+@pytest.mark.parametrize("lag", [0.15, 0.4, 0.8])
+@pytest.mark.parametrize("name", ["latency", "low_pass_filter"])
+def test_a_delay_is_no_filter_at_any_length(name, lag):
+    def change(load, base):
+        if name == "latency":
+            return np.interp(TIME - lag, TIME, base)
+        share = 1 - np.exp(-0.04 / lag)
+        return lfilter([share], [1, share - 1], base, zi=[(1 - share) * base[0]])[0]
+
+    found = machine(change, presses=16)
+    assert [m.name for m in found.named] == [name] and not found.named[0].rival
+    assert all(s.value == pytest.approx(lag, rel=0.25) for s in found.named[0].changed)
+
+
+def mirrored(course):
+    return replace(course, tip=course.tip * [1, 1, -1] + [0, 0, 70.0])
+
+
+@pytest.mark.parametrize("fault", [*FAULTS, "gain"])
+def test_an_axis_that_points_the_other_way_changes_no_name_and_no_size(fault):
+    change = FAULTS[fault][0] if fault in FAULTS else lambda load, base: 0.4 + 1.2 * (base - 0.4)
+    plain, other = machine(change), machine(change, seen=mirrored)
+    assert [m.name for m in other.named] == [m.name for m in plain.named]
+    sign = -1 if "against" in fault else 1
+    for a, b in zip(plain.named, other.named, strict=True):
+        assert [s.value for s in b.sizes] == pytest.approx([sign * s.value for s in a.sizes], rel=1e-3)
+
+
+@pytest.mark.parametrize("amplitude", [1.0, 0.0], ids=["noise", "dead"])
+def test_channels_without_a_signal_take_no_name_away(amplitude):
+    noise = amplitude * np.random.default_rng(2).normal(size=(2 * 16 * len(TIME), 5))
+    found = machine(
+        FAULTS["delay"][0], presses=16, seen=lambda c: replace(c, readings=np.column_stack([c.readings, noise]))
+    )
+    assert [m.name for m in found.named] == ["latency"] and all(c.quiet for c in found.controls)
+    assert {s.channel for s in found.named[0].changed} == {0}
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_machine_that_is_read_more_often_has_no_less_of_a_filter(side):
+    def seldom(course):
+        row = np.arange(course.rows)
+        keep = (course.session[course.episode] != side) | (row % 4 == 0)
+        columns = {n: getattr(course, n)[keep] for n in ("time", "episode", "tip", "tool", "readings", "averaged")}
+        return replace(course, **columns)
+
+    found = machine(lambda load, base: base, seen=seldom, wander=0.002)
+    assert found.status == "none" and found.probabilities["low_pass_filter"] < 0.5
 
 
 def test_a_response_has_no_friction_that_ends_with_the_motion():

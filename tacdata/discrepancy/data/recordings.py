@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from tacdata.discrepancy.data.tip_observation import Views, second_views
 from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
 from tacdata.recording import Episode, read_session
-from tacdata.recording.files.reader import read_recording
+from tacdata.recording.files.reader import Recording, read_recording
 from tacdata.recording.session import FILE
 
 SAME_PLACE = 0.15
@@ -58,10 +59,10 @@ def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
         FormatError: If they do not have the same channels, or hold no readings.
     """
     paths = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
-    numbered = [(number, read_recording(file)) for number, path in enumerate(paths) for file in recordings_in(path)]
-    numbered = [(number, r) for number, r in numbered if len(r.episode.taxels.sample_ns) > 1]
+    sessions = [[(number, read_recording(file)) for file in recordings_in(path)] for number, path in enumerate(paths)]
+    sessions = [[(n, r) for n, r in session if len(r.episode.taxels.sample_ns) > 1] for session in sessions]
     # By time, whatever the order of the arguments: memory follows the clock.
-    numbered.sort(key=lambda item: int(item[1].episode.taxels.sample_ns[0]))
+    numbered = _by_time([entry for session in sessions for entry in _by_time(session)])
     numbered_episodes = [(number, r.episode) for number, r in numbered]
     notes: list[str] = []
     if not numbered_episodes:
@@ -100,6 +101,13 @@ def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
         parts, (columns, limits), numbered_episodes[0][1], (bool(force), bool(temperature), bool(views)), notes
     )
     return replace(course, effort=_effort([e for _, e in numbered_episodes]))
+
+
+def _by_time(numbered: list[tuple[int, Recording]]) -> list[tuple[int, Recording]]:
+    """Return recordings in the order of time; as they are if two overlap, since each then has a clock of its own."""
+    ordered = sorted(numbered, key=lambda item: int(item[1].episode.taxels.sample_ns.min()))
+    spans = [(int(r.episode.taxels.sample_ns.min()), int(r.episode.taxels.sample_ns.max())) for _, r in ordered]
+    return ordered if all(a[1] <= b[0] for a, b in pairwise(spans)) else numbered
 
 
 def _effort(episodes: list[Episode]) -> bool | None:

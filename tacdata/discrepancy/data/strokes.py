@@ -11,7 +11,7 @@ UP, DOWN = 0.6, 0.25
 
 
 def strokes(time_ns: np.ndarray, depth: np.ndarray) -> list[tuple[int, int]]:
-    """Return the time spans of strokes [ns], touching one another, from the shallowest point between them.
+    """Return the time spans of strokes [ns], touching one another, from the point between them nearest to rest.
 
     Args:
         time_ns: Times of the path [ns], shape (k,), int64.
@@ -22,6 +22,9 @@ def strokes(time_ns: np.ndarray, depth: np.ndarray) -> list[tuple[int, int]]:
     if high - low <= 0:
         return [full_span]
     share = (depth - low) / (high - low)
+    if min(share[0], share[-1]) > UP:
+        # An axis that points the other way: the path comes from its largest value and returns to it.
+        share = 1 - share
     tops, deep = [], False
     for i, value in enumerate(share.tolist()):
         if value > UP and not deep:
@@ -33,7 +36,7 @@ def strokes(time_ns: np.ndarray, depth: np.ndarray) -> list[tuple[int, int]]:
         return [full_span]
     cuts = []
     for first, second in pairwise(tops):
-        between = depth[first:second]
+        between = share[first:second]
         lowest = np.flatnonzero(between <= between.min() + 1e-9)
         # In the middle of the time at rest: idle readings before and after a stroke then belong to it.
         middle = first + int(lowest[len(lowest) // 2])

@@ -63,6 +63,19 @@ def test_a_clock_begins_with_the_next_press_where_its_first_is_left_out(tapes):
     assert course.restarts is not None and course.restarts.tolist() == [False, True, True]
 
 
+def test_clocks_of_their_own_do_not_order_presses(tmp_path):
+    """Each begins whenever its logger woke up: the order of the files is that of the presses."""
+    for k, begin in enumerate((0.3, 0.1, 0.2, 0.0)):
+        time = np.arange(0, 4, STEP)
+        stretch = np.interp(time, [0.5, 1.5, 2.5], [0, 8 + k, 0])
+        rows = [f"{begin + t:.3f},{d:.4f},{d + 0.1:.4f}" for t, d in zip(time, stretch, strict=True)]
+        (tmp_path / f"pull_{k:02d}.csv").write_text("\n".join(["t,d,F", *rows]))
+    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(MAPPING))
+    course = course_of(import_session(tmp_path, tmp_path / "mapping.yaml", tmp_path / "session").folder)
+    deepest = [course.tip[course.episode == e, 2].max() for e in range(4)]
+    assert deepest == pytest.approx([8, 9, 10, 11], abs=0.5) and np.all(np.diff(course.time) > 0)
+
+
 def test_a_tape_that_relaxes_and_goes_slack_has_memory_and_no_friction(tapes):
     answer = judge(course_of(tapes), read_spec(None)).document
     named = {e["family"] for e in answer["effects"] if e["status"] == "named"}
