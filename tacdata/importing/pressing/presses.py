@@ -141,7 +141,8 @@ def _doubts(mapping: Mapping, streams: ImportedStreams, place: Registration) -> 
     if position is None or entry is None or min(len(taxels.time_ns), len(position.time_ns)) < FEWEST:
         return ()
     depth = place.to_sensor(position.values)[:, 2]
-    doubts = () if mapping.taxels.trusted else reading_doubts(taxels, position.time_ns, depth)
+    read = [*([] if mapping.taxels.trusted else [taxels]), *(each for each in streams.measured if each.name == "force")]
+    doubts = tuple(doubt for each in read for doubt in reading_doubts(each, position.time_ns, depth))
     if (entry.file, entry.clock.column) != (mapping.taxels.file, mapping.taxels.clock.column):
         doubts += lag_doubts(taxels, position)
     return doubts

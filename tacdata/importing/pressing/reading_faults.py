@@ -36,24 +36,24 @@ POLICY = ReadingPolicy()
 
 
 def reading_doubts(
-    taxels: Stream, time_ns: np.ndarray, depth: np.ndarray, policy: ReadingPolicy = POLICY
+    stream: Stream, time_ns: np.ndarray, depth: np.ndarray, policy: ReadingPolicy = POLICY
 ) -> tuple[str, ...]:
     """Return doubts about readings, as sentences.
 
     Args:
-        taxels: The channels.
+        stream: The channels, or a force.
         time_ns: Times of the path [ns], shape (n,).
         depth: Its depths [mm], shape (n,).
         policy: The limits.
     """
-    at = np.interp(taxels.time_ns, time_ns, depth)
+    at = np.interp(stream.time_ns, time_ns, depth)
     stroke = float(np.ptp(at)) if len(at) else 0.0
     if stroke <= 0:
         return ()
     rest = at <= at.min() + policy.rest * stroke
     moving = np.concatenate([[False], np.abs(np.diff(at)) > policy.moves * stroke])
     jumps, limits = [], []
-    for name, column in zip(taxels.names, taxels.values.T, strict=False):
+    for name, column in zip(stream.names, stream.values.T, strict=False):
         if len(np.unique(column[np.isfinite(column)])) <= policy.levels:
             continue
         jumps += [(row, size, name) for row, size in _jumps(column, rest, policy)]
@@ -63,15 +63,15 @@ def reading_doubts(
         row, size, name = min(jumps)
         channels = len({each[2] for each in jumps})
         doubts.append(
-            f"taxels: readings of {channels} channel{'s' * (channels > 1)} jump while nothing touches, first {name} by "
-            f"{size:.4g} at {taxels.time_ns[row] / 1e9:.6g} s: was it tared, or its range switched, there?"
+            f"{stream.name}: readings of {channels} channel{'s' * (channels > 1)} jump while nothing touches, first "
+            f"{name} by {size:.4g} at {stream.time_ns[row] / 1e9:.6g} s: was it tared, or its range switched, there?"
         )
     if limits:
         name, value, rows = limits[0]
         channels = f"{len(limits)} channel{'s saturate' if len(limits) > 1 else ' saturates'}"
         doubts.append(
-            f"taxels: {channels}: {name} stays at {value:.6g} for {rows} rows while the indenter moves; such readings "
-            "count as measured"
+            f"{stream.name}: {channels}: {name} stays at {value:.6g} for {rows} rows while the indenter moves; such "
+            "readings count as measured"
         )
     return tuple(doubts)
 

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from tacdata.importing.units import factor
+from tacdata.importing.units import factor, quantity_of
 
 STATED_RATE = re.compile(
     r"(?:sampl\w*|abtast\w*|acquisition|scan)[ _-]*(?:rate|freq\w*)?[^\d\n]{0,20}?"
@@ -29,23 +29,34 @@ COUNTS = r"(?:counts?|steps?|ticks?|pulses|inc(?:rement)?s?)"
 PER = rf"{COUNTS}\s*(?:/|per )\s*(mm|N|newton|force)\b"
 STATED_COUNTS = re.compile(rf"(\d+(?:\.\d+)?)\s*{PER}|{PER}\W{{1,4}}(\d+(?:\.\d+)?)(?:\s*\(?(N|lbf|kgf))?", re.I)
 """How a file states how many counts are a millimetre or a newton."""
+STATED_SIZE = re.compile(
+    rf"(\d+(?:\.\d+)?)\s*([mu\u00b5]m|m?N)\s*(?:/|per )\s*{COUNTS}"
+    r"|\b(?:count|tick|pulse|lsb)\s*=\s*(\d+(?:\.\d+)?)\s*([mu\u00b5]m|m?N|[mu\u00b5n]s)\b",
+    re.I,
+)
+"""How a file states the size of a count."""
 COUNTED = {
     "mm": re.compile(
         r"(enc(oder)?|steps?|pulses|(stage|motor|present|z)?_?pos(ition)?|z)(_?(count|step|tick)s?)?", re.I
     ),
     "N": re.compile(r"f_?[xyzn]?|(force|load)(_?[xyzn])?", re.I),
+    "s": re.compile(r"(time|clock)?_?ticks?|t(ime)?(_?stamp)?", re.I),
 }
-"""Names of positions and forces that a motor, an encoder or a converter may count."""
+"""Our unit -> names of columns that a motor, an encoder, a converter or a clock may count."""
 
 
 def stated_counts(text: str, skip: int, columns: dict[str, np.ndarray]) -> dict[str, str]:
     """Return the unit, as 1/800 mm, of whole numbers, if the first lines of a text state the size of a count."""
-    units = {}
-    for match in STATED_COUNTS.finditer("\n".join(text.split("\n", skip)[:skip])):
-        ours = "mm" if (match[2] or match[3]).lower() == "mm" else "N"
-        names = [name for name in columns if COUNTED[ours].fullmatch(name) and columns[name].dtype != object]
-        whole = [name for name in names if not np.nansum(columns[name] % 1)]
-        units |= dict.fromkeys(whole, f"1/{match[1] or match[4]} {(match[5] if ours == 'N' else '') or ours}")
+    head = "\n".join(text.split("\n", skip)[:skip])
+    sizes = [f"{match[1] or match[3]} {match[2] or match[4]}" for match in STATED_SIZE.finditer(head)]
+    for match in STATED_COUNTS.finditer(head):
+        is_length = (match[2] or match[3]).lower() == "mm"
+        sizes.append(f"1/{match[1] or match[4]} {'mm' if is_length else match[5] or 'N'}")
+    units: dict[str, str] = {}
+    for size in sizes:
+        pattern = COUNTED[quantity_of(size) or ""]
+        names = [name for name, values in columns.items() if pattern.fullmatch(name) and values.dtype != object]
+        units |= {name: size for name in names if not np.nansum(columns[name] % 1)}
     return units
 
 

@@ -64,6 +64,12 @@ def test_torques_without_a_unit_go_with_the_forces(tmp_path):
             (T, np.rint(1e4 * FORCE), np.rint(400 * DEPTH)),
             {"Fz": "1/10000 N", "enc_count": "1/400 mm"},
         ),
+        (
+            "# encoder: 0.0025 mm/count, load cell: 0.0001 N/count\nt,load,encoder",
+            (T, np.rint(1e4 * FORCE), np.rint(400 * DEPTH)),
+            {"load": "0.0001 N", "encoder": "0.0025 mm"},
+        ),
+        ("# 1 tick = 500 us\ntick,Fz,depth", (np.rint(2000 * T), FORCE, DEPTH), {"tick": "500 us"}),
         ("Counts Per Force: 1000000 (N)\nt,Fz,depth", (T, FORCE, DEPTH), {}),  # no whole numbers: N already
     ],
 )
@@ -281,3 +287,11 @@ def test_comments_may_name_columns_and_units(tmp_path):
     head = "# columns: height vDeflection seriesTime\n# other: 1 2\n# units: m N s"
     table = read_table(written(tmp_path, head, -DEPTH / 1000, FORCE, T, name="run.txt", between=" "))
     assert table.units == {"height": "m", "vDeflection": "N", "seriesTime": "s"}
+
+
+def test_a_load_cell_at_its_limit_is_told(tmp_path):
+    written(tmp_path / "source", "t,depth,Fz,c0,c1", T, DEPTH, np.minimum(FORCE, 1.0), CHANNEL, CHANNEL)
+    force = {"file": "run", "columns": "Fz", "unit": "N"}
+    path = mapping(tmp_path, tmp_path / "run.csv", measured={"force": force})
+    made = import_session(tmp_path / "source", path, tmp_path / "session")
+    assert any("force: 1 channel saturates: Fz stays at 1 for" in note for note in made.notes)
