@@ -141,8 +141,8 @@ def file_sets(source: Path, files: dict[str, FileEntry]) -> list[FileSet]:
     leading = max(keys, key=lambda name: len(keys[name]))
     led = [parts for parts, _ in matches[leading]]
     if files[leading].join:
-        # Files that are joined repeat the parts of their trial: each trial counts once.
-        led = [parts for number, parts in enumerate(led) if parts not in led[:number]]
+        # Files that are joined repeat the parts of their trial, with a number more or without: each trial counts once.
+        led = [parts for k, parts in enumerate(led) if not any(other.items() <= parts.items() for other in led[:k])]
     return [_set(parts, files, matches) for parts in led]
 
 

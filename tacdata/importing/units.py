@@ -28,7 +28,7 @@ FACTORS: dict[str, dict[str, float]] = {
 }
 """Our unit -> the units that can be converted to it, and the factor."""
 SPELLINGS = {
-    "s": "sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondo secondi \u79d2",
+    "s": "sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondo secondi sn \u79d2",
     "ms": "millisekunde millisekunden milisegundos millisecondes \u6beb\u79d2 msec "
     "msecs millis millisec millisecs millisecond milliseconds",
     "us": "usec usecs micros microsec microsecs microsecond microseconds",

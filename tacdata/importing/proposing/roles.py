@@ -15,12 +15,12 @@ BODY = r"(pos(ition)?|loc(ation)?|stage|tcp|tip|tool|ee|robot|probe|indenter|act
 """Bodies whose coordinates a column may hold."""
 GUESSES = {
     "time": (
-        r"(x_value|time|t|ts|utc|gmt|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|时间|時間)"
+        r"(x_value|time|t|ts|utc|gmt|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|zaman|时间|時間)"
         r"([_ ]?(time|zeit|uhrzeit))?|((realtime|sys(tem)?)_?)?ticks?|\w+_(time_?)?stamp(_(ns|us|ms|s|sec))?"
     ),
     "depth": (
         r"(depth|indentation|displacement|disp|travel|stroke|extension|crosshead|((present|actual|measured)_)?pos(ition)?"
-        r"|(traversen|verfahr)?weg|eindringtiefe|d|dist(ance)?|desplazamiento|d[eé]placement|spostamento|位移|変位)"
+        r"|(traversen|verfahr)?weg|eindringtiefe|d|dist(ance)?|desplazamiento|d[eé]placement|spostamento|uzama|位移|変位)"
     ),
     "set_point": (
         r"set_?point|(set|target|cmd|command(ed)?|desired|demand(ed)?|ref(erence)?)_?"
@@ -31,7 +31,7 @@ GUESSES = {
     "y": rf"({BODY}[_.]?)?y|p_?y|y_?{BODY}|(actual_)?tcp_pose_?1",
     "z": rf"({BODY}[_.]?)?z|p_?z(_?(meas(ured)?|act(ual)?|ist))?|z_?{BODY}|height|(actual_)?tcp_pose_?2",
     "force": (
-        r"(f|fz|fn|force(_?z)?|load(_?cell)?|weight|kraft|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)"
+        r"(f|fz|fn|force(_?z)?|load(_?cell)?|weight|kraft|kuvvet|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)"
         r"|(actual_)?tcp_force_?[0-2]"
     ),
     "torque": r"(torque|moment)(_?[xyz])?|tau_?[xyz]|drehmoment|(actual_)?tcp_force_?[3-5]",

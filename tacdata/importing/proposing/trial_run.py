@@ -188,7 +188,7 @@ def _faults(run: TrialRun) -> list[str]:
             f"zero, count depth from it ({own_zero})"
         )
     cut = sum(end > policy.back * stroke > 0 for end, stroke in zip(ends, strokes, strict=True))
-    if 2 * cut > len(presses) > 1:
+    if 2 * cut > len(presses) > 1 and not any(entry.join for entry in run.mapping.files.values()):
         faults.append(
             f"{cut} of {len(presses)} recordings end deep in the skin: if ramp and hold are parts of one trial, join "
             "them (join: continued)"

@@ -295,3 +295,18 @@ def test_a_load_cell_at_its_limit_is_told(tmp_path):
     path = mapping(tmp_path, tmp_path / "run.csv", measured={"force": force})
     made = import_session(tmp_path / "source", path, tmp_path / "session")
     assert any("force: 1 channel saturates: Fz stays at 1 for" in note for note in made.notes)
+
+
+def test_a_ramp_and_its_hold_with_a_number_more_are_one_trial(tmp_path):
+    for trial in (1, 2):
+        folder = tmp_path / f"pad-{trial}" / f"Test Run {trial}"
+        ramp, depth = slice(0, 41), trial * np.maximum(DEPTH, 0)
+        hold = slice(41, 60)
+        head = "Crosshead \tLoad \tTime \nmm\tN\tsec"
+        folder.parent.mkdir()
+        for part, rows in (("", ramp), ("1", hold)):
+            columns = (-depth[rows], FORCE[rows] + 0.001 * trial, T[rows])
+            written(folder, head, *columns, name=f"DAQ - (Timed){part}.txt", between="\t")
+    found = proposed(tmp_path)
+    said = tried(tmp_path, found.mapping)
+    assert "2 of 2 sets of files hold 2 recordings of 60 rows" in said and "not good" not in said
