@@ -26,7 +26,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
     cross, shifted = volume.cross, volume.shifted
     ElementData, ConstantData = element_data(real), constant_data(real)
     of_element = element_functions(real)
-    gather, slope, gradient, add = of_element.gather, of_element.slope, of_element.gradient, of_element.add
+    gather, gradient, forces, add = of_element.gather, of_element.gradient, of_element.forces, of_element.add
     constants, stretch, Nodal = of_element.constants, of_element.stretch, of_element.Nodal
     bearable = wp.constant(real(BEARABLE))
     Four = wp.types.vector(4, real)
@@ -100,10 +100,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
             # The law's stress has kappa j cof F of the point's own j; the average replaces that j.
             excess = kappa * (at_point(averages, mesh, q) - volume_change(H, K))
             P = (stress_of(H, c) + excess * shifted(K, real(1.0))) * (mesh.weights[e, q] * s)
-            for a in range(10):
-                f = P * slope(mesh, e, q, a, s)
-                for i in range(3):
-                    result[a, i] = result[a, i] + f[i]
+            result += forces(P, mesh, e, q, s)
         wp.atomic_min(smallest, b, least)
         add(result, mesh, e, b, total)
 
@@ -139,10 +136,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
             onward = at_point(changes, mesh, q) - wp.ddot(cof, D)
             dP = tangent_of(H, D, c) + kappa * (onward * cof + excess * cross(shifted(H, real(1.0)), D))
             dP = dP * (mesh.weights[e, q] * s)
-            for a in range(10):
-                f = dP * slope(mesh, e, q, a, s)
-                for i in range(3):
-                    result[a, i] = result[a, i] + f[i]
+            result += forces(dP, mesh, e, q, s)
         add(result, mesh, e, b, total)
 
     @wp.kernel(module="unique", enable_backward=False)
