@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import torch
 
-from tacdata.skin.linear.sweep_kernels import ROWS, invert_in_place, sweep_kernels
+from tacdata.skin.linear.sweep_kernels import ROWS, STRIP, invert_in_place, sweep_kernels
 from tacdata.skin.member.warp_arrays import argument
 from tacdata.warp_runtime import wp
 
@@ -54,7 +54,7 @@ def _invert(pivot: torch.Tensor) -> None:
     torch.matmul(root.mT, root, out=pivot)
 
 
-def _launch(name: str, matrix: torch.Tensor, dim: tuple[int, ...], *values: object) -> None:
+def _launch(name: str, matrix: torch.Tensor, shape: tuple[int, ...], *values: object) -> None:
     if matrix.numel():
-        kernel = getattr(sweep_kernels(matrix.dtype), name)
+        kernel, dim = getattr(sweep_kernels(matrix.dtype), name), (shape[0], shape[1] // int(STRIP), shape[2])
         wp.launch(kernel, dim=dim, inputs=[*map(argument, values)], device=str(matrix.device))

@@ -18,6 +18,9 @@ from tacdata.warp_runtime import wp
 ROWS = 128
 """Size of the matrices."""
 
+STRIP = wp.constant(8)
+"""Rows of one column a thread of the other kernels does: of a mirror image they are eight neighbours in memory."""
+
 _THREADS = 256
 
 _SWEEPS = """
@@ -100,34 +103,40 @@ def sweep_kernels(dtype: torch.dtype) -> SimpleNamespace:
         a: wp.array3d(dtype=real), start: int, end: int, column: wp.array3d(dtype=real), pivot: wp.array3d(dtype=real)
     ):
         """Read the columns from ``start`` to ``end``, the block on the diagonal apart."""
-        b, i, c = wp.tid()
-        value = real(0.0)
-        # Only the lower triangle is up to date: entries above the pivot are read from their mirror images.
-        if i < start:
-            value = a[b, start + c, i]
-        elif i < end:
-            pivot[b, i - start, c] = a[b, i, start + c]
-        else:
-            value = a[b, i, start + c]
-        column[b, i, c] = value
+        b, strip, c = wp.tid()
+        for k in range(STRIP):
+            i, value = strip * STRIP + k, real(0.0)
+            # Only the lower triangle is up to date: entries above the pivot are read from their mirror images.
+            if i < start:
+                value = a[b, start + c, i]
+            elif i < end:
+                pivot[b, i - start, c] = a[b, i, start + c]
+            else:
+                value = a[b, i, start + c]
+            column[b, i, c] = value
 
     @wp.kernel(module="unique", enable_backward=False)
     def put(
         swept: wp.array3d(dtype=real), pivot: wp.array3d(dtype=real), start: int, end: int, a: wp.array3d(dtype=real)
     ):
         """Write the block that `take` read, after its sweep."""
-        b, i, c = wp.tid()
-        if i < start:
-            a[b, start + c, i] = swept[b, i, c]
-        elif i < end:
-            a[b, i, start + c] = -pivot[b, i - start, c]
-        else:
-            a[b, i, start + c] = swept[b, i, c]
+        b, strip, c = wp.tid()
+        for k in range(STRIP):
+            i = strip * STRIP + k
+            if i < start:
+                a[b, start + c, i] = swept[b, i, c]
+            elif i < end:
+                a[b, i, start + c] = -pivot[b, i - start, c]
+            else:
+                a[b, i, start + c] = swept[b, i, c]
 
     @wp.kernel(module="unique", enable_backward=False)
     def unfold(a: wp.array3d(dtype=real), row: wp.array(dtype=wp.int64), matrix: wp.array3d(dtype=real)):
         """Write the inverses, of which the negative lower triangle is known, as rows of ``whole``."""
-        b, i, j = wp.tid()
-        matrix[wp.int32(row[b]), i, j] = -a[b, wp.max(i, j), wp.min(i, j)]
+        b, strip, j = wp.tid()
+        m = wp.int32(row[b])
+        for k in range(STRIP):
+            i = strip * STRIP + k
+            matrix[m, i, j] = -a[b, wp.max(i, j), wp.min(i, j)]
 
     return SimpleNamespace(take=take, put=put, unfold=unfold)
