@@ -15,6 +15,9 @@ nothing."""
 PIVOT = wp.constant(128)
 """Rows of a block."""
 
+STRIP = wp.constant(8)
+"""Rows of the compliance a thread of `assemble` does, in one column."""
+
 _LEAST = wp.constant(wp.float32(1.0e-30))
 
 
@@ -37,6 +40,19 @@ def between(table: wp.array2d(dtype=wp.float32), i: int, j: int, n: wp.vec3, m: 
             for q in range(3):
                 if m[q] != wp.float32(0.0):
                     total += n[p] * m[q] * table[i + p, j + q]
+    return total
+
+
+@wp.func
+def loaded(table: wp.array2d(dtype=wp.float32), i: int, j: int, m: wp.vec3):
+    """Displacements [mm/N] of three rows from i on, for a force along m at the rows from j on."""
+    total = wp.vec3()
+    for p in range(3):
+        # A flat surface's constraint has one row, perhaps the last, and asks for no more.
+        if i + p < table.shape[0]:
+            for q in range(3):
+                if m[q] != wp.float32(0.0):
+                    total[p] = total[p] + m[q] * table[i + p, j + q]
     return total
 
 
@@ -124,26 +140,37 @@ def assemble(
 
     The blocks on the diagonal, on which the inverse pivots, are written whole.
     """
-    g, i, j = wp.tid()
-    if j > i:
+    g, strip, j = wp.tid()
+    first = strip * STRIP
+    if j >= first + STRIP:
         return
     b = wp.int32(member[g])
-    value = wp.float32(0.0)
-    if i < rows.own[b] and j < rows.own[b]:
-        value = scale[b] * between(
-            table, rows.first[b, i], rows.first[b, j], direction_of(rows, b, i), direction_of(rows, b, j)
-        )
-        if i == j:
-            value += rows.give[b, i, 0]
-        # Both tangents of a node are neighbours in this order; only they are coupled by D^-1.
-        elif j == i - 1:
-            value += rows.give[b, i, 1]
-    # A unit matrix beyond the member's constraints keeps the padded matrix positive definite.
-    elif i == j:
-        value = wp.float32(1.0)
-    compliance[g, i, j] = value
-    if i / PIVOT == j / PIVOT:
-        compliance[g, j, i] = value
+    own, column, m = rows.own[b], rows.first[b, j], direction_of(rows, b, j)
+    known, toward = wp.int32(-1), wp.vec3()
+    for i in range(first, wp.min(first + STRIP, compliance.shape[1])):
+        value = wp.float32(0.0)
+        if j <= i and i < own:
+            # The three constraints of a node join the same rows.
+            if rows.first[b, i] != known:
+                known = rows.first[b, i]
+                toward = loaded(table, known, column, m)
+            n = direction_of(rows, b, i)
+            for p in range(3):
+                if n[p] != wp.float32(0.0):
+                    value += n[p] * toward[p]
+            value = scale[b] * value
+            if i == j:
+                value += rows.give[b, i, 0]
+            # Both tangents of a node are neighbours in this order; only they are coupled by D^-1.
+            elif j == i - 1:
+                value += rows.give[b, i, 1]
+        # A unit matrix beyond the member's constraints keeps the padded matrix positive definite.
+        elif i == j:
+            value = wp.float32(1.0)
+        if j <= i:
+            compliance[g, i, j] = value
+            if i / PIVOT == j / PIVOT:
+                compliance[g, j, i] = value
 
 
 @wp.kernel(enable_backward=False)

@@ -149,7 +149,8 @@ class ActiveRows:
             room: Receives them, bordered by a unit matrix, shape (g, a, a), float32.
         """
         rows = self._held
-        self.launch(kernels.assemble, tuple(room.shape), member, rows.data, rows.scale, self._table, room)
+        dim = len(room), -(-room.shape[1] // int(kernels.STRIP)), room.shape[2]
+        self.launch(kernels.assemble, dim, member, rows.data, rows.scale, self._table, room)
 
     def wanted(self, gaps: Sequence[torch.Tensor]) -> torch.Tensor:
         """Return changes of mean gaps [mm], by contact, shape (s, b), as values of the constraints, shape (b, a)."""
