@@ -95,7 +95,7 @@ class Batch:
         )
         none = torch.zeros_like(u[0, 0])
         self._at = Configuration(u, multipliers, idle.repeat(capacity), poses, histories, none, none.clone())
-        self._base = self._at.unknowns
+        self._base = self._at.unknowns.copy()
         self._status = ContactStatus(newton.surfaces)
         self._starts = Starts(self._base, any(surface.attracts for surface in newton.surfaces))
         self._failed_at = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
@@ -162,17 +162,15 @@ class Batch:
     def _settled(self) -> Residual:
         """Evaluate the forces, shortening steps that went astray."""
         residual, at = self._newton.residual(self._at), self._at
-        step = at.unknowns.minus(self._base)
         for _ in range(_HALVINGS):
             # After a start there is no step to shorten.
             bad = self._newton.is_bad(self._before, residual) & torch.isfinite(self._before)
-            marks = bad.cpu().numpy()
-            if not marks.any():
+            which = bad.nonzero()[:, 0]
+            if not len(which):
                 break
-            factor = torch.where(bad, 1 / _SHORTER, 1.0)
-            step = step.zeros().plus(step, factor)
-            at.unknowns = self._base.plus(step).where(bad, at.unknowns)
-            residual = self._updated(residual, marks)
+            base = self._base.take(which)
+            at.unknowns.put(which, base.plus(at.unknowns.take(which).minus(base), 1 / _SHORTER))
+            residual = self._newton.updated(residual, at, which)
         return residual
 
     def _updated(self, residual: Residual, changed: np.ndarray) -> Residual:
@@ -311,9 +309,7 @@ class Batch:
         wild = self._newton.body.internal_force(proposed.u, self._at.conditions.take(columns))[1] < _WILD
         proposed = self._starts.accepted.take(columns).where(wild, proposed)
         near[columns] = torch.where(wild, TOUCHING, near[columns])
-        state = self._at.unknowns.copy()
-        state.put(columns, proposed)
-        self._at.unknowns = state
+        self._at.unknowns.put(columns, proposed)
         self._at.near = torch.where(which, near, self._at.near)
         # An infinite residual: the start of a load step has no predecessor to be compared with.
         self._before = torch.where(which, torch.inf, self._before)

@@ -23,8 +23,12 @@ class Unknowns(Columns):
 
     def plus(self, change: Unknowns, factor: torch.Tensor | float = 1.0) -> Unknowns:
         """Return the sum with others, times a factor, shape (b,)."""
-        pairs = zip(self.multipliers, change.multipliers, strict=True)
-        return Unknowns(self.u + factor * change.u, tuple(a + factor * b for a, b in pairs))
+        pairs = zip((self.u, *self.multipliers), (change.u, *change.multipliers), strict=True)
+        if isinstance(factor, torch.Tensor):
+            u, *multipliers = (torch.addcmul(a, b, factor) for a, b in pairs)
+        else:
+            u, *multipliers = (torch.add(a, b, alpha=factor) for a, b in pairs)
+        return Unknowns(u, tuple(multipliers))
 
     def minus(self, reference: Unknowns) -> Unknowns:
         """Return the difference from others."""

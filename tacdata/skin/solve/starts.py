@@ -52,9 +52,11 @@ class Starts:
             state: Unknowns of all members.
         """
         inverse = torch.where(straight & (step != 0), 1 / torch.where(step != 0, step, 1.0), 0.0)
-        rate = state.zeros().plus(state.minus(self.accepted), inverse)
-        self._rate = rate.where(which & ((step != 0) | ~straight), self._rate)
-        self.accepted = state.where(which, self.accepted)
+        # Of the members that are meant alone: few are, and fields are large.
+        rated, found = (mask.nonzero()[:, 0] for mask in (which & ((step != 0) | ~straight), which))
+        change = state.take(rated).minus(self.accepted.take(rated))
+        self._rate.put(rated, change.zeros().plus(change, inverse[rated]))
+        self.accepted.put(found, state.take(found))
         self._loading.add(which, depth, state)
 
     def guess(
