@@ -17,12 +17,15 @@ from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import Adhesion
 from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear import constraint_kernels as kernels
 from tacdata.skin.linear.constraint_solvers import InvertedCompliance
 from tacdata.skin.linear.rest_stiffness import SparseRest, rest_solver
 from tacdata.skin.member.conditions import conditions
+from tacdata.skin.member.warp_arrays import argument, filled
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
+from tacdata.warp_runtime import wp
 
 pytestmark = [pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")]
 GPU = "cuda:0"
@@ -119,12 +122,13 @@ def test_derivatives_agree():
                 assert np.abs(ours.surface[k] - theirs.surface[k]).max() < 0.01 * wide + 1e-6
 
 
-def test_kernels_agree_to_rounding(held):
+@pytest.mark.parametrize("averaged", [False, True])
+def test_kernels_agree_to_rounding(held, averaged):
     u = 0.05 * np.sin(held.mesh.nodes @ np.random.default_rng(1).uniform(-1, 1, (3, 3)))
     p = np.random.default_rng(2).normal(size=u.shape)
     found = []
     for device in ("cpu", GPU):
-        body = Elasticity(held.mesh, "neo_hookean", device)
+        body = Elasticity(held.mesh, "neo_hookean", device, averaged)
         own = conditions(slab_sensor().material, 0.0, device=device).repeat(2)
         field, along = batch(u, 2 * u).to(device), batch(p, p).to(device)
         product = torch.zeros_like(field)
@@ -149,6 +153,34 @@ def test_the_dense_inverse_is_a_good_preconditioner_and_its_compliance_is_its_ow
     assert (matrix[5] - moved).abs().max() < 1e-3 * moved.abs().max()
     assert torch.equal(matrix, matrix.T)
     assert torch.linalg.eigvalsh(matrix.double()).min() > -1e-4
+
+
+def compliance(device):
+    """Of two members' constraints: nodes of three rows, as on a rough face; one of the last row, as on a flat one."""
+    random = torch.Generator().manual_seed(6)
+    table, size = torch.randn(31, 31, generator=random), 16
+    first = torch.tensor([*[0] * 3, *[3] * 3, *[12] * 3, *[24] * 3, 30, 0, 0, 0]).repeat(2, 1).int()
+    direction = torch.randn(2, size, 3, generator=random)
+    direction[:, 12, 1:] = 0.0
+    give, own = torch.rand(2, size, 2, generator=random), torch.tensor([13, 6]).int()
+    room, scale = torch.zeros(2, size, size), torch.tensor([1.0, 2.0])
+    member = torch.tensor([1, 0])
+    values = (value.to(device) for value in (first, direction, give, own))
+    rows = filled(kernels.RowData, **dict(zip(("first", "direction", "give", "own"), values, strict=True)))
+    member, scale, table, room = (value.to(device) for value in (member, scale, table + table.T, room))
+    wp.launch(
+        kernels.assemble,
+        dim=(2, -(-size // int(kernels.STRIP)), size),
+        inputs=[argument(value) for value in (member, rows, scale, table, room)],
+        device=device,
+    )
+    return room.cpu()
+
+
+def test_compliances_agree_to_rounding():
+    ours, theirs = compliance(GPU), compliance("cpu")
+    assert theirs[0, 6:, 6:].equal(torch.eye(10)) and theirs[1, 12, :12].abs().min() > 0
+    assert (ours - theirs).abs().max() < 1e-6 * theirs.abs().max()
 
 
 def test_inverses_are_those_of_the_cpu_whatever_runs_beside_them():
