@@ -32,33 +32,34 @@ _SWEEPS = """
     for (int a = 0; a < 8; ++a)
         #pragma unroll
         for (int b = 0; b < 8; ++b) r[a][b] = m[(ty + 16 * a) * 128 + tx + 16 * b];
-    for (int k = 0; k < 128; ++k) {
-        real* row = line[k & 1];
-        #pragma unroll
-        for (int a = 0; a < 8; ++a)
-            if (ty + 16 * a == k)
+    // Row 16 of + step: so its place in the registers is known to the compiler, which has to choose none.
+    #pragma unroll
+    for (int of = 0; of < 8; ++of)
+        #pragma unroll 1
+        for (int step = 0; step < 16; ++step) {
+            real* row = line[step & 1];
+            if (ty == step)
                 #pragma unroll
-                for (int b = 0; b < 8; ++b) row[tx + 16 * b] = r[a][b];
-        // Two rows in turn: who writes the next has read all of the one before.
-        __syncthreads();
-        const real over = real(1) / row[k];
-        real along[8];
-        #pragma unroll
-        for (int b = 0; b < 8; ++b) along[b] = row[tx + 16 * b] * over;
-        #pragma unroll
-        for (int a = 0; a < 8; ++a) {
-            const int i = ty + 16 * a;
-            const real down = row[i];
+                for (int b = 0; b < 8; ++b) row[tx + 16 * b] = r[of][b];
+            // Two rows in turn: who writes the next has read all of the one before.
+            __syncthreads();
+            const real over = real(1) / row[16 * of + step];
+            real along[8];
             #pragma unroll
-            for (int b = 0; b < 8; ++b) {
-                const int j = tx + 16 * b;
-                real value = r[a][b] - down * along[b];
-                if (i == k) value = along[b];
-                if (j == k) value = i == k ? -over : down * over;
-                r[a][b] = value;
+            for (int b = 0; b < 8; ++b) along[b] = row[tx + 16 * b] * over;
+            #pragma unroll
+            for (int a = 0; a < 8; ++a) {
+                const real down = row[ty + 16 * a];
+                #pragma unroll
+                for (int b = 0; b < 8; ++b) r[a][b] -= down * along[b];
+                if (tx == step) r[a][of] = down * over;
+            }
+            if (ty == step) {
+                #pragma unroll
+                for (int b = 0; b < 8; ++b) r[of][b] = along[b];
+                if (tx == step) r[of][of] = -over;
             }
         }
-    }
     #pragma unroll
     for (int a = 0; a < 8; ++a)
         #pragma unroll
