@@ -85,7 +85,8 @@ class ContactSurface:
         """The projection onto the hats."""
         self.area = torch.as_tensor(self.mortar.area, device=nodes.device)
         """Area of each hat, undeformed [mm^2], shape (s,)."""
-        self.able = ~fixed[torch.as_tensor(self.mortar.nodes, device=nodes.device)]
+        self._nodes = torch.as_tensor(self.mortar.nodes, device=nodes.device)
+        self.able = ~fixed[self._nodes]
         """Nodes that may carry a multiplier, shape (s,), bool."""
         self._mean_nodes = self.mortar.means(nodes[:, :, None].contiguous())
         """Mean undeformed place under each hat [mm], shape (s, 3, 1)."""
@@ -179,7 +180,7 @@ class ContactSurface:
         # The shift by ``near`` adds close nodes at the start of a load step, while their pressures are unknown (0019).
         active = (multiplier - c * (gap - near) > 0) & self.able[:, None]
         pressure = torch.where(active, multiplier, 0.0)
-        nodal, normal = torch.zeros_like(total), self._zeros(u, 3)
+        nodal, normal = self._zeros(u, 3), self._zeros(u, 3)
         points = (0, 0) if self.flat else tuple(self.weights.shape)
         # Normals turn as the face moves. Above a plane they do not, and the term is left out.
         turn = torch.zeros(*points, 6, b, dtype=torch.float32, device=u.device)
@@ -210,12 +211,12 @@ class ContactSurface:
             outputs=[argument(value) for value in (local, shear, force, stiffness)],
             device=self.device,
         )
+        total.index_add_(0, self._nodes, nodal)
+        resultant = nodal.sum(dim=0)
         if self.rough:
-            self.mortar.spread(force, nodal)
-        total += nodal
-        return ContactForces(
-            nodal.sum(dim=0), gap, pressure, shear, local, ContactTangent(active, normal, stiffness, turn)
-        )
+            self.mortar.spread(force, total)
+            resultant += force.sum(dim=0)
+        return ContactForces(resultant, gap, pressure, shear, local, ContactTangent(active, normal, stiffness, turn))
 
     def add_product(self, at: ContactTangent, p: torch.Tensor, result: torch.Tensor) -> None:
         """Add the contact's stiffness times ``p`` [N] to ``result``; both of shape (n, 3, b) and of one precision.

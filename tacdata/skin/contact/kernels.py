@@ -242,7 +242,7 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
         for a in range(6):
             j = surface.slots[f, a]
             for i in range(3):
-                wp.atomic_add(force, surface.faces[f, a], i, b, total[a, i])
+                wp.atomic_add(force, j, i, b, total[a, i])
                 wp.atomic_add(mean_normal, j, i, b, means[a, i] / surface.area[j])
 
     return pressures
