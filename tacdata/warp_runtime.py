@@ -55,22 +55,16 @@ Objects for a kind serve every machine of that kind. Those for Warp's default, t
 
 GPUS = "gpus"
 """Folder of modules for GPUs, among those of kinds of processors."""
-_UNROLLED_ON_GPU = wp.config.max_unroll
+UNROLLED_ON_GPU = wp.config.max_unroll
 """Passes up to which a kernel's loop is written out for a GPU: Warp's own number."""
-
-
-def compile_for_gpu() -> None:
-    """Have kernels that are declared from now on compiled as for a GPU."""
-    wp.config.max_unroll = _UNROLLED_ON_GPU
-    # A thread has one index. By Warp's default it loops, for grids of fewer threads than indices; here there are none.
-    wp.config.default_grid_stride = False
 
 
 def start() -> None:
     """Start Warp; all other output of its native library is passed on."""
     _start_quietly()
+    # A thread has one index. By Warp's default it loops, for grids of fewer threads than indices; here there are none.
+    wp.config.default_grid_stride = False
     if wp.is_cuda_available():
-        compile_for_gpu()
         copy_to_cache(shipped_kernels() / wp.__version__ / GPUS)
     else:
         wp.config.max_unroll = UNROLLED

@@ -71,10 +71,10 @@ def compile_all(folder: str, shapes: Sequence[Indenter] = (), architectures: Seq
         shapes: The shapes.
         architectures: The GPUs, as `ARCHITECTURES`.
     """
-    from tacdata.warp_runtime import compile_for_gpu, wp
+    from tacdata.warp_runtime import UNROLLED_ON_GPU, wp
 
     # Before any kernel is declared: modules then have the names that a machine with a GPU asks for.
-    compile_for_gpu()
+    wp.config.max_unroll = UNROLLED_ON_GPU
     from tacdata.skin.derivatives.compilation import derivative_kernels
     from tacdata.skin.press import PressRequest
     from tacdata.skin.solve.compilation import batch_kernels

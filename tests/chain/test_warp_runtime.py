@@ -100,8 +100,8 @@ warp.is_cuda_available = lambda: True
 import tacdata.warp_runtime
 """
 BUILT = """
-from tacdata.warp_runtime import compile_for_gpu, wp
-compile_for_gpu()
+from tacdata.warp_runtime import UNROLLED_ON_GPU, wp
+wp.config.max_unroll = UNROLLED_ON_GPU
 """
 PLAIN = "import tacdata.warp_runtime"
 NAMES = """
