@@ -32,18 +32,6 @@ class RowData:
 
 
 @wp.func
-def between(table: wp.array2d(dtype=wp.float32), i: int, j: int, n: wp.vec3, m: wp.vec3):
-    """Compliance [mm/N] along m at the rows from j on, for a force along n at the rows from i on."""
-    total = wp.float32(0.0)
-    for p in range(3):
-        if n[p] != wp.float32(0.0):
-            for q in range(3):
-                if m[q] != wp.float32(0.0):
-                    total += n[p] * m[q] * table[i + p, j + q]
-    return total
-
-
-@wp.func
 def loaded(table: wp.array2d(dtype=wp.float32), i: int, j: int, m: wp.vec3):
     """Displacements [mm/N] of three rows from i on, for a force along m at the rows from j on."""
     total = wp.vec3()
@@ -120,8 +108,9 @@ def describe(
     D = wp.mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
     # The stiffness along the slip is near 0 with the tangent, so D^-1 needs a bound.
     softness = SOFT * scale[b]
-    tt = wp.dot(t, D * t) + wp.float32(1.0) / wp.max(softness * between(table, first, first, t, t), _LEAST)
-    vv = wp.dot(v, D * v) + wp.float32(1.0) / wp.max(softness * between(table, first, first, v, v), _LEAST)
+    along_t, along_v = loaded(table, first, first, t), loaded(table, first, first, v)
+    tt = wp.dot(t, D * t) + wp.float32(1.0) / wp.max(softness * wp.dot(t, along_t), _LEAST)
+    vv = wp.dot(v, D * v) + wp.float32(1.0) / wp.max(softness * wp.dot(v, along_v), _LEAST)
     tv = wp.dot(t, D * v)
     size = tt * vv - tv * tv
     put_row(rows, b, s + 1, first, t, vv / size, zero)

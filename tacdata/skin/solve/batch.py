@@ -156,7 +156,7 @@ class Batch:
         if changed.any():
             self._fill(waiting, observe)
             self._start(changed)
-            residual = self._updated(residual, changed)
+            residual = self._newton.updated(residual, self._at, self._tensor(changed.nonzero()[0]))
         self._step(residual)
 
     def _settled(self) -> Residual:
@@ -172,9 +172,6 @@ class Batch:
             at.unknowns.put(which, base.plus(at.unknowns.take(which).minus(base), 1 / _SHORTER))
             residual = self._newton.updated(residual, at, which)
         return residual
-
-    def _updated(self, residual: Residual, changed: np.ndarray) -> Residual:
-        return self._newton.updated(residual, self._at, self._tensor(changed.nonzero()[0]))
 
     def _judge(self, residual: Residual) -> list[str]:
         changed = self._status.changed(residual.contacts, self._at.conditions.friction).to(residual.relative.dtype)

@@ -19,6 +19,7 @@ from tacdata.skin.member.pose import turned
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.batch import Batch
+from tacdata.skin.solve.newton import Newton
 from tacdata.skin.solve.settings import SolverSettings
 
 SENSOR = slab_sensor(size=4.0, friction=0.2, pixels=9)
@@ -85,9 +86,9 @@ def test_states_come_in_the_order_of_the_path(model):
 
 def test_what_has_changed_is_evaluated_once_an_iteration(model, monkeypatch):
     """Members that found a state and those that failed, together; those that go on are not evaluated again."""
-    judge, again, step = Batch._judge, Batch._updated, Batch._step
+    judge, again, step = Batch._judge, Newton.updated, Batch._step
     changed, sent, seen = [], [], set()
-    monkeypatch.setattr(Batch, "_updated", lambda own, now, who: changed.append(who.tolist()) or again(own, now, who))
+    monkeypatch.setattr(Newton, "updated", lambda *now: changed.append(now[-1].tolist()) or again(*now))
 
     def judged(own, now):
         changed.clear()
@@ -96,11 +97,11 @@ def test_what_has_changed_is_evaluated_once_an_iteration(model, monkeypatch):
         if "failed" not in seen and "found" in verdicts and "go on" in verdicts and verdicts.count("idle") == 0:
             verdicts[verdicts.index("go on")] = "failed"
         seen.update(verdicts)
-        sent[:] = [verdict in ("found", "failed") for verdict in verdicts]
+        sent[:] = [column for column, verdict in enumerate(verdicts) if verdict in ("found", "failed")]
         return verdicts
 
     def stepped(own, now):
-        assert changed == ([sent] if any(sent) else [])
+        assert changed == ([sent] if sent else [])
         step(own, now)
 
     monkeypatch.setattr(Batch, "_judge", judged)
