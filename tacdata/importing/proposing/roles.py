@@ -109,8 +109,7 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
     """Return the columns of each role; ``channels`` are those of no other."""
     roles: dict[str, list[str]] = {"channels": []}
     later = later_blocks(table)
-    lettered = are_letters(list(table.columns))
-    numbered = _numbered(list(table.columns))
+    lettered, numbered = are_letters(list(table.columns)), _numbered(list(table.columns))
     for name, values in table.columns.items():
         if name in later or (values.dtype.kind == "f" and np.isnan(values).all()):
             continue  # a comma at the end of each row makes an empty one
@@ -229,13 +228,8 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
     if TORQUE.fullmatch(unit_text):
         return "torque"
     # "t" or "d" with the unit of another quantity, as V, is no time and no depth.
-    if (
-        (role == "time" or len(bare) == 1)
-        and role not in (None, "force")
-        and values.dtype != object
-        and not unit
-        and unit_text.lower() in OTHERS
-    ):
+    is_other = values.dtype != object and not unit and unit_text.lower() in OTHERS
+    if is_other and role != "force" and (role == "time" or len(bare) == 1):
         role = None
     # R2 is a resistance next to R1, Tx a torque next to Fx, and X a count of rows where it rises by 1.
     if bare in ("r2", "r_2") and {"r1", "r_1", "r3", "r_3"} & set(map(bare_name, table.columns)):

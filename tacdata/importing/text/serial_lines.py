@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 
+from tacdata.errors import FormatError
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.text.layout import text_layout
 
@@ -76,7 +77,10 @@ def with_receipt(data: bytes) -> bytes:
     cut = [line.partition(b"->")[2].strip() if RECEIPT.match(line) else b"" for line in lines]
     named = without_labels(b"\n".join(cut)).split(b"\n")
     lines, cut = [*[b""] * (len(named) - len(cut)), *lines], named  # the names are a line more
-    layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), ReadOptions(), "")
+    try:
+        layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), ReadOptions(), "")
+    except FormatError:  # the reader names it with its file
+        return data
     between = b"\t" if layout.delimiter == " " else layout.delimiter.encode()
     bodies = [between.join(text.split()) if layout.delimiter == " " else text for text in cut]
     begin = [b"received" if number < layout.skip else RECEIPT.match(line) for number, line in enumerate(lines)]

@@ -310,3 +310,9 @@ def test_a_ramp_and_its_hold_with_a_number_more_are_one_trial(tmp_path):
     found = proposed(tmp_path)
     said = tried(tmp_path, found.mapping)
     assert "2 of 2 sets of files hold 2 recordings of 60 rows" in said and "not good" not in said
+
+
+def test_a_monitor_without_numbers_is_refused_by_its_name(tmp_path):
+    (tmp_path / "serial.txt").write_text("".join(f"10:00:{k:06.3f} -> waiting for the board\n" for k in range(40)))
+    with pytest.raises(FormatError, match=r"serial\.txt: no row of numbers"):
+        read_table(tmp_path / "serial.txt")
