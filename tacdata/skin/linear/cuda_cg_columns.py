@@ -7,6 +7,7 @@ takes the host longer than the GPU takes to run them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import torch
 
@@ -114,7 +115,13 @@ class ActiveColumns:
         side.wait_stream(torch.cuda.current_stream(self.x.device))
         with torch.cuda.stream(side), wp.ScopedStream(wp.stream_from_torch(side), sync_enter=False):
             graph.capture_begin()
-            iteration(self)
+            try:
+                iteration(self)
+            except BaseException:
+                # Until the recording is ended nothing can be freed, and an error of that would hide this one.
+                with suppress(RuntimeError):
+                    graph.capture_end()
+                raise
             graph.capture_end()
         torch.cuda.current_stream(self.x.device).wait_stream(side)
         return graph

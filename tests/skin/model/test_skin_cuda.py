@@ -4,6 +4,7 @@ Solved so tightly that they must find the same; what the default tolerance leave
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.elasticity.body import Elasticity
 from tacdata.skin.linear import constraint_kernels as kernels
 from tacdata.skin.linear.constraint_solvers import InvertedCompliance
+from tacdata.skin.linear.cuda_cg_columns import ActiveColumns
 from tacdata.skin.linear.rest_stiffness import SparseRest, rest_solver
 from tacdata.skin.member.conditions import conditions
 from tacdata.skin.member.warp_arrays import argument, filled
@@ -199,3 +201,10 @@ def test_inverses_are_those_of_the_cpu_whatever_runs_beside_them():
         for number, (size, matrix) in enumerate(zip(sizes, matrices, strict=True)):
             found = solver.inverse[number, :size, :size].double().cpu()
             assert (found @ matrix - torch.eye(size)).norm() < 1e-4 * max(size, 1)
+
+
+def test_a_recording_that_finds_the_card_full_leaves_it_usable():
+    columns = SimpleNamespace(x=torch.zeros(1, device="cuda:0"))
+    with pytest.raises(torch.OutOfMemoryError):
+        ActiveColumns._record(columns, lambda _: torch.empty(2**42, device="cuda:0"))
+    assert float(torch.ones(10, device="cuda:0").sum()) == 10.0
