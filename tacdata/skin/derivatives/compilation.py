@@ -1,4 +1,4 @@
-"""The kernels of derivatives on a GPU, beside those of the press itself (`tacdata.skin.solve.compilation`)."""
+"""The kernels of derivatives on a GPU; those of the press are in `tacdata.skin.solve.compilation`."""
 
 from __future__ import annotations
 
