@@ -114,14 +114,14 @@ def _turned(
         way = "falls" if motion.sign < 0 else "grows"
         text = f"{name}: it {way} into the skin, so its sign is turned (scale: -1)"
         questions.append(Question(text, "sign", (name,)))
-    offset, change = _lowest(axis, kind.table, name, channels) if is_depth else (0.0, 0)
+    offset, change = _lowest(axis, kind.table, name, channels)
     if change:
         text = (
             f"{name}: from row {change} on presses go to the other side of zero: was its direction changed? Then make "
             "two files of it, and give scale: -1 for one"
         )
         questions.append(Question(text, "sign", (name,)))
-    if offset:
+    if is_depth and offset:
         axis = replace(axis, offset=offset)
         text = (
             f"{name}: readings answer on both sides of its zero, so depth is counted from the lowest "

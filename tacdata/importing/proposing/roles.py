@@ -238,6 +238,8 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
         role = "torque"
     if role == "x" and values.dtype != object and values.ndim == 1 and (np.diff(values) == 1).all():
         role = "counter"
+    elif role == "counter" and values.dtype == object:
+        role = None
     role = {"N": "force", "s": "time"}.get(unit or "", role)
     if role is None and len(bare) > 1 and quantity_of(bare) == "s":
         return "time"  # "ms", "seconds"

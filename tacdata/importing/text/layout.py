@@ -112,7 +112,7 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
     if not options.header:
         header, first = [], next(k for k, row in enumerate(rows) if len(row) == width)
     sample = [row for row in rows[first:] if len(row) == width]
-    if header and len(header[-1]) == width - 1 and _are_row_names(sample):
+    if header and len(header[-1]) == width - 1 and _are_row_names(sample, decimal):
         header = [[ROW_NAME, *row] if len(row) == width - 1 else row for row in header]
     _refuse_other_number(header, sample, origin)
     names, units = _names(header, width)
@@ -122,13 +122,13 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
     return TextLayout(delimiter, decimal, start, names, units, kinds)
 
 
-def _are_row_names(rows: list[list[str]]) -> bool:
+def _are_row_names(rows: list[list[str]], decimal: str) -> bool:
     """Return whether the first column names or numbers the rows, as R writes it without a name in the header."""
     first, last = [row[0] for row in rows], [row[-1] for row in rows]
     if len(rows) < 2 or not all(last):  # a delimiter at the end of each row makes an empty column instead
         return False
     begin = int(first[0]) if first[0].isdigit() else -1
-    return first == [str(begin + k) for k in range(len(first))] or not any(is_number(name, ".") for name in first)
+    return first == [str(begin + k) for k in range(len(first))] or not any(is_number(name, decimal) for name in first)
 
 
 def _otherwise(text: str, options: ReadOptions, origin: str) -> str:

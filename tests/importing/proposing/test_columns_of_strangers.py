@@ -125,13 +125,14 @@ def test_trials_below_their_names_are_not_mixed(tmp_path, names):
     assert found.document["taxels"]["columns"] == [names[2]]
 
 
-def test_presses_that_go_to_the_other_side_of_zero_are_asked_about(tmp_path):
-    path, skin = np.tile(DEPTH, 2), np.tile(CHANNEL, 2)
+@pytest.mark.parametrize(("name", "sign"), [("depth", 1), ("z", 1), ("z", -1)])
+def test_presses_that_go_to_the_other_side_of_zero_are_asked_about(tmp_path, name, sign):
+    path, skin = sign * np.tile(DEPTH, 2), np.tile(CHANNEL, 2)
     path[200:] *= -1
-    written(tmp_path, "t [s],depth [mm],c0,c1", np.arange(400) / 20, path, skin, 2 * skin)
+    written(tmp_path, f"t [s],{name} [mm],c0,c1", np.arange(400) / 20, path, skin, 2 * skin)
     found = proposed(tmp_path)
     row = next(int(q.split("from row ")[1].split()[0]) for q in found.questions if "other side of zero" in q)
-    assert 220 <= row <= 240 and "offset" not in found.document["position"]["depth"]
+    assert 220 <= row <= 240 and "offset" not in found.document["position"].get("depth", {})
 
 
 def test_recordings_of_another_sign_are_told():
@@ -316,3 +317,18 @@ def test_a_monitor_without_numbers_is_refused_by_its_name(tmp_path):
     (tmp_path / "serial.txt").write_text("".join(f"10:00:{k:06.3f} -> waiting for the board\n" for k in range(40)))
     with pytest.raises(FormatError, match=r"serial\.txt: no row of numbers"):
         read_table(tmp_path / "serial.txt")
+
+
+def test_decimal_commas_are_no_names_of_rows(tmp_path):
+    rows = "\n".join(
+        f"{t:.3f};{d:.4f};{c:.4f};{c:.4f}".replace(".", ",") for t, d, c in zip(T, DEPTH, CHANNEL, strict=True)
+    )
+    (tmp_path / "run.csv").write_text(f"Zeit [s];Weg [mm];K1\n{rows}\n")
+    with pytest.raises(FormatError, match="3 names in the header, and 4 values"):
+        read_table(tmp_path / "run.csv")
+
+
+def test_a_text_called_frame_is_no_counter(tmp_path):
+    rows = [f"{t:.2f},{d:.4f},{f:.4f},{k:X} {2 * k:X}" for k, (t, d, f) in enumerate(zip(T, DEPTH, FORCE, strict=True))]
+    (tmp_path / "run.csv").write_text("\n".join(["t [s],z [mm],Fz [N],frame", *rows]))
+    assert any("frame holds text" in q for q in proposed(tmp_path).questions)
