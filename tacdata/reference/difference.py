@@ -30,7 +30,7 @@ NEEDED = 0.15
 """A second name explains at least this share of the difference by itself: less may be form error of the first [1]."""
 WINDOWS = 20
 """Parts of a press whose means are compared, whatever the name."""
-LAGS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1)
+LAGS = (0.003, 0.006, 0.012, 0.025, 0.05)
 """Lengths of a delay or a filter that are tried first, over the shortest press [1]..."""
 NEARER = (0.59, 0.71, 0.84, 1.0, 1.19, 1.41, 1.68)
 """...and then, over the best of them: a curve near another length fits worse than another mechanism's [1]."""
@@ -203,7 +203,9 @@ def _with_rival(mechanism: str, belief: Posterior) -> tuple[float, str]:
 
 def _model(conditions: tuple[PressKind, ...]) -> tuple[dict[str, np.ndarray], list[list[Shape]], Posterior]:
     """Return lengths of lags [s], the shapes of each condition with these, and their probabilities."""
-    lags = dict.fromkeys(LAGGING, min(float(np.ptp(c.time)) for c in conditions) * np.array(LAGS))
+    delays = min(float(np.ptp(c.time)) for c in conditions) * np.array(LAGS)
+    # A longer filter has the curve of a relaxation.
+    lags = {"low_pass_filter": delays[:-1], "latency": delays}
     columns = [shapes(c, lags) for c in conditions]
     support = posterior(conditions, columns).support
     for name in LAGGING:

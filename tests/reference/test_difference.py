@@ -95,8 +95,10 @@ def test_play_is_named_wherever_its_zero_was_found(way_in):
         assert s.value == pytest.approx(play, rel=0.2)
 
 
-@pytest.mark.parametrize("lag", [0.15, 0.4, 0.8])
-@pytest.mark.parametrize("name", ["latency", "low_pass_filter"])
+@pytest.mark.parametrize(
+    ("name", "lag"),
+    [("latency", 0.15), ("latency", 0.4), ("latency", 0.8), ("low_pass_filter", 0.15), ("low_pass_filter", 0.4)],
+)
 def test_a_delay_is_no_filter_at_any_length(name, lag):
     def change(load, base):
         if name == "latency":
@@ -107,6 +109,15 @@ def test_a_delay_is_no_filter_at_any_length(name, lag):
     found = machine(change, presses=16)
     assert [m.name for m in found.named] == [name] and not found.named[0].rival
     assert all(s.value == pytest.approx(lag, rel=0.25) for s in found.named[0].changed)
+
+
+def test_relaxation_is_no_long_filter():
+    share = 1 - np.exp(-0.04 / 1.5)
+
+    def relaxing(load, base):
+        return base - 0.2 * (base - lfilter([share], [1, share - 1], base, zi=[(1 - share) * base[0]])[0])
+
+    assert [m.name for m in machine(relaxing, presses=16).named] == ["relaxation"]
 
 
 def mirrored(course):
