@@ -15,6 +15,8 @@ SEEN_LIVING = 3.0
 """Time in which a camera of ten images a second shows that its images differ [s]."""
 SILENT = 3.0
 """Time after which a silent camera or controller is a fault [s]."""
+SILENCE = SILENT + 1.5
+"""Time within which the silence of a controller must have ended a run [s]."""
 OVERRIDDEN = 6.0
 """Time within which a report must have stated a foreign override [s]: one in 20 states overrides, of 8 a second."""
 AT_REST = 1.0
@@ -31,7 +33,9 @@ class Faults:
         self.world, self.random = world, random.Random(f"faults {seed}")
         course = PRESS_SECONDS * len(world.plan.presses)
         self.fatal, self.stalls = [], []
-        """(time of a fault [s], time [s] within which it must have ended the run, if it goes on until then)."""
+        """(time of a fault [s], time [s] within which it must have ended the run if it lasts, who says it)."""
+        self.silences = []
+        """(begin, end) of times in which no word of the controller arrives [s], as long as they may go unnoticed."""
         self.names, self.visible, self.over = [], [], False
         """(time of a fault [ns], time [ns] after which the recorder can see it, its name)."""
         self.deaf = False
@@ -82,10 +86,18 @@ class Faults:
         """Note that the recorder can see it from now on, or so much later [s]."""
         self.visible.append((self.world.schedule.now_ns, round(seconds * SECOND), name))
 
-    def must_end(self, seconds):
-        """Note that the run must end within so many seconds from now [s], once it is under way."""
+    def must_end(self, seconds, words=True):
+        """Note that the run must end within so many seconds from now [s], once it is under way.
+
+        ``words``: the controller says it; otherwise this computer sees it.
+        """
         if self.world.schedule.now > LIVED:
-            self.fatal.append((self.world.schedule.now, seconds))
+            self.fatal.append((self.world.schedule.now, seconds, words))
+
+    def silent(self, until=np.inf):
+        """Note that no word of the controller arrives until then [s]; the silence itself is noticed."""
+        now = self.world.schedule.now
+        self.silences.append((now, min(until, now + SILENCE)))
 
     def stalled(self, seconds):
         """Note a stall of the computer that must end the run if the guide moves."""
@@ -95,7 +107,8 @@ class Faults:
         """Return the first time at which a fault must have ended the run [s]; None on a late computer.
 
         Waits in which nothing moves do not count: the next path notices it. Time in which this computer does not run
-        the thread that hears the controller does not count either.
+        the thread that hears the controller does not count either. A fault that a controller says cannot be known in
+        its silence: a door that opened after it fell mute is noticed as silence (seed 13215).
         """
         computer, drives = self.world.computer, self.world.drives
         if not self.fatal or computer.stalls or computer.lateness:
@@ -103,7 +116,7 @@ class Faults:
         ends, begins = [0.0, *(end for _, end in drives)], [*(begin for begin, _ in drives), np.inf]
         waits = [(end, begin) for end, begin in zip(ends, begins, strict=True) if begin - end > AT_REST]
         waits += [(begin / SECOND, end / SECOND) for begin, end in computer.unheard("grbl-listen")]
-        return min(_outside(waits, at, most) for at, most in self.fatal)
+        return min(_outside(waits + self.silences * words, at, most) for at, most, words in self.fatal)
 
     def seen(self, cameras=True):
         """Return when the recorder could first see one of them [s], or None; without ``cameras``, one of the others."""
@@ -223,6 +236,8 @@ def _late(faults, *ways, most=7.0):
     until = faults.world.schedule.now_ns + round(faults.random.choice((0.05, 0.3, 1.0, most)) * SECOND)
     for way in ways:
         way.held_until = until
+    if faults.world.cnc_line.to_host in ways:
+        faults.silent(until / SECOND)
 
 
 def damaged_answer(faults):
@@ -279,13 +294,14 @@ def board_unplugged(faults):
 
 def controller_unplugged(faults):
     faults.deaf = True
-    faults.must_end(2.0)
+    faults.must_end(2.0, words=False)
     faults.world.cnc_line.close()
 
 
 def controller_mute(faults):
     faults.deaf = True
-    faults.must_end(SILENT + 1.5)
+    faults.must_end(SILENCE, words=False)
+    faults.silent()
     faults.world.controller.inject_wire(to_host=lambda text: None)
 
 

@@ -135,6 +135,8 @@ def test_what_must_hold_of_every_run_holds(seed):
         (1593, ()),  # a board pulled out while its reader did not run: no fault of the recorder
         (5582, ()),  # a board that freezes twice shows another reading once: no fault of the recorder
         (2347, ()),  # told that the zero was lost, the person did not find it: no fault of the recorder
+        (11549, ()),  # 2.8 mm below the envelope by a line in inches, and the way back up: no fault of the recorder
+        (13215, ()),  # a door that opened after the controller fell mute: no fault of the recorder
         (2594, ()),  # a board pulled out in a lift: the way of the registration was tried again all the same
     ],
 )

@@ -208,7 +208,8 @@ class GuardedMotion:
         """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; return the result as a sentence."""
         # This text stays if the lift itself is interrupted.
         self._lifted = f"the indenter was not lifted (interrupted){self._advice}"
-        self._lifted = self._lift(height, speed)
+        # In one line: a signal before it finds a lift under way, not a tip that still stands where the lift began.
+        self._lifted, self._rising = self._lift(height, speed), None
         if self.lifted or self._still:
             with suppress(TacdataError):  # the fault itself must be reported first; the mark of a motion stays
                 self.settle()
@@ -258,7 +259,6 @@ class GuardedMotion:
                 "a lift that ends where it was sent",
                 "a line was damaged on its way: check cable and ground, then start again",
             )
-        self._rising = None
         return reached
 
     def _came_to_rest(self) -> bool:

@@ -1,11 +1,16 @@
 """A lift is watched as any path is, tried again where the controller obeys, and reported as it ended."""
 
 import re
+import signal
+from types import SimpleNamespace
 
 import pytest
-from simulated_rig import ORIGIN, World
+from drawn_faults import AtALine
+from simulated_rig import ORIGIN, Calm, World
+from simulated_run import Run, broken
 
 from tacdata.errors import DeviceError
+from tacdata.recording.motion.allowed_path import AllowedPath
 
 PRESSING = 7_000_000_000
 """Time at which the tip is in the skin [ns]."""
@@ -154,3 +159,24 @@ def test_a_reset_that_nobody_answers_is_tried_again_before_the_lift(tmp_path, fa
     clear = next(t for t, _, _, z, *_ in world.path if t > broken[0] and z > ORIGIN[2] + 2.9)
     assert clear - broken[0] < 6.0
     assert not world.lost
+
+
+@pytest.mark.parametrize("lines", range(1, 13))
+def test_a_signal_as_a_lift_ends_leaves_true_words(tmp_path, monkeypatch, lines):
+    """A second Ctrl-C at each line from the last look at the lift on; the words once named where it had begun."""
+    world, is_short = World(1, tmp_path / "session"), AllowedPath.is_short
+    faults = SimpleNamespace(world=world, over=False, see=lambda name: None)
+    watchers = []
+
+    def look(path, target, position):
+        watchers.append(AtALine(faults, signal.SIGINT, lines))
+        return is_short(path, target, position)
+
+    monkeypatch.setattr(AllowedPath, "is_short", look)
+    world.schedule.at(PRESSING, lambda: world.computer.send_signal(signal.SIGINT))
+    run = Run(world)
+    world.end()
+    (watcher,) = watchers
+    assert watcher.left == 0 and isinstance(run.error, KeyboardInterrupt)
+    assert run.here[2] == pytest.approx(ORIGIN[2] + 3.0, abs=0.01)
+    assert not list(broken(run, Calm()))
